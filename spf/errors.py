@@ -1,0 +1,23 @@
+"""The errors that a user can cause, each one sentence that says what is wrong and what to do."""
+
+__all__ = ["HandError", "SessionError", "SettingError", "SpfError", "StartError"]
+
+
+class SpfError(Exception):
+    """Base of all errors that the command line and the dashboard show as one sentence."""
+
+
+class SessionError(SpfError):
+    """A session cannot be opened, read or written."""
+
+
+class SettingError(SpfError, ValueError):
+    """A setting is unknown, not a number or out of its range."""
+
+
+class HandError(SpfError):
+    """A hand model, a hand shape or a pose does not fit."""
+
+
+class StartError(SpfError):
+    """No believable first pose could be found."""
