@@ -1,0 +1,152 @@
+"""Pose a hand: forward kinematics, skinning (1, 2), and the products ``J_F v`` and ``J_Fᵀ u`` (14, 22)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spf.errors import HandError
+from spf.hand.model import Hand
+from spf.kernels import kinematics as kernels
+
+__all__ = ["PosedHand", "joints_of", "pose_hand", "rotation_about", "skin_jvp", "skin_vjp"]
+
+Array = NDArray[np.float64]
+
+
+class PosedHand(NamedTuple):
+    """A hand in the camera frame.
+
+    Attributes:
+        vertices: (V, 3) m.
+        normals: (V, 3) unit.
+        joints: (21, 3) m, ordered as :data:`~spf.frame.JOINT_NAMES`.
+        frames: (16, 3, 4) T_camera_bone.
+    """
+
+    vertices: Array
+    normals: Array
+    joints: Array
+    frames: Array
+
+
+class _Chain(NamedTuple):
+    pose: Array
+    frames: Array
+    axes: Array
+    matrices: Array
+
+
+def _chain(hand: Hand, pose: ArrayLike, reference: ArrayLike | None) -> _Chain:
+    p = np.ascontiguousarray(pose, dtype=np.float64)
+    if p.shape != (hand.dofs,):
+        raise HandError(f"A pose of this hand has {hand.dofs} entries, not {p.shape}.")
+    if not np.isfinite(p).all():
+        raise HandError("The pose holds a value that is not a finite number.")
+    rotation = np.eye(3) if reference is None else np.ascontiguousarray(reference, dtype=np.float64)
+    bones = len(hand.skeleton.parent)
+    frames, matrices = np.empty((bones, 3, 4)), np.empty((bones, 3, 4))
+    axes = np.empty((3 + len(hand.skeleton.revolute_bone), 3))
+    kernels.pose_bones(hand.skeleton, p, rotation, frames, axes)
+    kernels.skinning_matrices(hand.skeleton, frames, matrices)
+    return _Chain(p, frames, axes, matrices)
+
+
+def pose_hand(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -> PosedHand:
+    """Pose a hand: linear blend skinning ``v_p = Σ w M B⁻¹ v_b`` (1, 2; Bray et al. 2007).
+
+    Args:
+        hand: the model.
+        pose: (D,) metres and radians.
+        reference: (3, 3) orientation R_ref that the palm's angles turn; identity when None.
+
+    Raises:
+        HandError: the pose has the wrong length or is not finite.
+    """
+    chain = _chain(hand, pose, reference)
+    vertices, normals = np.empty_like(hand.skin.vertices), np.empty_like(hand.skin.normals)
+    kernels.skin(hand.skin, chain.matrices, chain.pose[:3], vertices, normals)
+    frames = chain.frames.copy()
+    frames[:, :, 3] += chain.pose[:3]
+    return PosedHand(vertices, normals, _place_joints(hand, frames), frames)
+
+
+def joints_of(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -> Array:
+    """Return the 21 joints (21, 3) of a pose, m; cheaper than :func:`pose_hand`."""
+    chain = _chain(hand, pose, reference)
+    frames = chain.frames.copy()
+    frames[:, :, 3] += chain.pose[:3]
+    return _place_joints(hand, frames)
+
+
+def _place_joints(hand: Hand, frames: Array) -> Array:
+    at = frames[hand.joint_bone]
+    return np.einsum("jik,jk->ji", at[:, :, :3], hand.joint_offset) + at[:, :, 3]
+
+
+def rotation_about(angles: ArrayLike) -> Array:
+    """Return Rx(a) Ry(b) Rz(c), the palm's rotation relative to R_ref, (3, 3)."""
+    a, b, c = np.asarray(angles, dtype=np.float64)
+    ca, sa, cb, sb, cc, sc = np.cos(a), np.sin(a), np.cos(b), np.sin(b), np.cos(c), np.sin(c)
+    rx = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
+    ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
+    rz = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
+    return rx @ ry @ rz
+
+
+def skin_jvp(
+    hand: Hand, pose: ArrayLike, direction: ArrayLike, reference: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """``J_F v``: velocities of all vertices and unit normals, (V, 3) each, for a velocity (D,) of the pose.
+
+    One pass over the bones and one over the points; no Jacobian is built. The normals' part includes the derivative
+    of their normalisation.
+    """
+    chain = _chain(hand, pose, reference)
+    v = np.ascontiguousarray(direction, dtype=np.float64)
+    twists, velocities = np.empty((len(chain.frames), 6)), np.empty_like(chain.matrices)
+    kernels.bone_twists(hand.skeleton, chain.frames, chain.axes, v, twists)
+    kernels.skinning_velocities(chain.matrices, twists, velocities)
+    blended, blended_rate = _blend(hand, chain.matrices), _blend(hand, velocities)
+    points_rate = _apply(blended_rate, hand.skin.vertices) + blended_rate[:, :, 3] + v[:3]
+    raw = _apply(blended, hand.skin.normals)
+    length = np.linalg.norm(raw, axis=1, keepdims=True)
+    raw_rate = _apply(blended_rate, hand.skin.normals) / length
+    unit = raw / length
+    return points_rate, raw_rate - unit * np.sum(unit * raw_rate, axis=1, keepdims=True)
+
+
+def skin_vjp(
+    hand: Hand,
+    pose: ArrayLike,
+    point_forces: ArrayLike,
+    normal_forces: ArrayLike,
+    reference: ArrayLike | None = None,
+) -> Array:
+    """``J_Fᵀ u``: gradient (D,) of ``Σ u_x·x̂ + u_n·n̂`` over all vertices, for forces (V, 3) on points and normals."""
+    chain = _chain(hand, pose, reference)
+    u_x, u_n = np.asarray(point_forces, dtype=np.float64), np.asarray(normal_forces, dtype=np.float64)
+    raw = _apply(_blend(hand, chain.matrices), hand.skin.normals)
+    length = np.linalg.norm(raw, axis=1, keepdims=True)
+    unit = raw / length
+    u_n = (u_n - unit * np.sum(unit * u_n, axis=1, keepdims=True)) / length
+    homogeneous = np.hstack([hand.skin.vertices, np.ones((len(hand.skin.vertices), 1))])
+    per_point = u_x[:, :, None] * homogeneous[:, None, :]
+    per_point[:, :, :3] += u_n[:, :, None] * hand.skin.normals[:, None, :]
+    gathered = np.zeros_like(chain.matrices)
+    weighted = hand.skin.influence_weight[:, :, None, None] * per_point[:, None]
+    np.add.at(gathered, hand.skin.influence_bone, weighted)
+    gradient = np.zeros(hand.dofs)
+    wrenches = np.empty((len(gathered), 6))
+    kernels.joint_gradient(hand.skeleton, chain.frames, chain.axes, chain.matrices, gathered, wrenches, gradient)
+    return gradient
+
+
+def _blend(hand: Hand, matrices: Array) -> Array:
+    return np.einsum("vi,vijk->vjk", hand.skin.influence_weight, matrices[hand.skin.influence_bone])
+
+
+def _apply(matrices: Array, vectors: Array) -> Array:
+    return np.einsum("vij,vj->vi", matrices[:, :, :3], vectors)
