@@ -1,1 +1,1 @@
-"""."""
+"""Readers and writers of depth sessions, one format a file."""
