@@ -83,12 +83,17 @@ def costs(problem: Problem, poses: Array) -> Array:
     return energies
 
 
-def golden(problem: Problem, poses: Array) -> tuple[Array, Array]:
-    """Compare renders of poses (N, D) with the observed depth: golden energy (N,), silhouette overlap (N,)."""
+def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple[Array, Array]:
+    """Compare renders of poses (N, D) with the observed depth: golden energy (N,), silhouette overlap (N,).
+
+    Each pose may have its own scale (N,) of the hand.
+    """
+    if scales is None:
+        scales = np.ones(len(poses))
     hand = problem.hand
     energies, overlaps = np.empty(len(poses)), np.empty(len(poses))
     golden_energies(
         hand.skeleton, hand.proxy, hand.proxy_faces, problem.observation.arrays, np.ascontiguousarray(poses),
-        problem.reference, GOLDEN_TRUNCATION, energies, overlaps,
+        np.ascontiguousarray(scales), problem.reference, GOLDEN_TRUNCATION, energies, overlaps,
     )  # fmt: skip
     return energies, overlaps

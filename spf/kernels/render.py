@@ -192,8 +192,8 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, trun
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def golden_energies(skeleton, proxy, faces, obs, poses, reference, truncation, energies, overlaps):
-    """Golden energy and silhouette overlap of many poses (N, D), into (N,) arrays.
+def golden_energies(skeleton, proxy, faces, obs, poses, scales, reference, truncation, energies, overlaps):
+    """Golden energy and silhouette overlap of many poses (N, D) of the hand enlarged by scales (N,), into (N,) arrays.
 
     The part of the model that falls outside the grid adds its share of the vertices.
     """
@@ -206,6 +206,7 @@ def golden_energies(skeleton, proxy, faces, obs, poses, reference, truncation, e
     for n in range(poses.shape[0]):
         pose_bones(skeleton, poses[n], reference, frames, axes)
         skinning_matrices(skeleton, frames, matrices)
+        matrices *= scales[n]
         project_skin(proxy, matrices, poses[n, :3], obs.grid_camera, projected)
         rasterise(projected, faces, depth)
         lost = 0
@@ -214,7 +215,7 @@ def golden_energies(skeleton, proxy, faces, obs, poses, reference, truncation, e
                 lost += 1
         golden, overlap = compare_depth(
             depth, obs.grid_depth, obs.grid_labels, obs.grid_outside, obs.grid_camera,
-            frames[0, :, 3] + poses[n, :3], frames[0, :, 2], truncation,
+            scales[n] * frames[0, :, 3] + poses[n, :3], frames[0, :, 2], truncation,
         )  # fmt: skip
         energies[n] = golden + lost / projected.shape[0]
         overlaps[n] = overlap
