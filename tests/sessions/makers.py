@@ -84,7 +84,9 @@ def make_msra15(folder: Path, rng: np.random.Generator, frames: int = 4) -> Made
     folder.mkdir(parents=True)
     left, top, right, bottom = 100, 50, 180, 130
     tenths = np.zeros((frames, 240, 320), np.uint16)
-    tenths[:, top:bottom, left:right] = rng.integers(0, 2, (frames, 80, 80)) * rng.integers(3000, 5000, (frames, 80, 80))
+    tenths[:, top:bottom, left:right] = rng.integers(0, 2, (frames, 80, 80)) * rng.integers(
+        3000, 5000, (frames, 80, 80)
+    )
     joints = hand_joints(rng, frames)
     lines = [str(frames)]
     for number in range(frames):

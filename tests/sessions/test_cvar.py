@@ -118,5 +118,5 @@ def test_a_list_that_is_no_text_is_told(made):
 def test_images_in_tenths_of_millimetres_are_refused(made):
     for path in made.path.glob("*.png"):
         cv2.imwrite(str(path), cv2.imread(str(path), cv2.IMREAD_UNCHANGED).clip(0, 6000) * 10)
-    with pytest.raises(SessionError, match="no depth reading.*not in counts of 0.001 m"):
+    with pytest.raises(SessionError, match=r"no depth reading.*not in counts of 0.001 m"):
         open_session(made.path)

@@ -30,7 +30,7 @@ def test_cvar_without_its_list_is_a_plain_folder(tmp_path, rng):
 
 
 def test_nothing_there(tmp_path):
-    with pytest.raises(SessionError, match="There is no file or folder .*gone"):
+    with pytest.raises(SessionError, match=r"There is no file or folder .*gone"):
         open_session(tmp_path / "gone")
 
 

@@ -92,9 +92,7 @@ def test_a_wrong_camera_file_is_told(folder, text, said):
         open_session(folder)
 
 
-@pytest.mark.parametrize(
-    ("factor", "depth_unit"), [(0.001, 0.001), (0.1, 0.001), (1, 1.0), (100, 0.001), (1, 0.00001)]
-)
+@pytest.mark.parametrize(("factor", "depth_unit"), [(0.001, 0.001), (0.1, 0.001), (1, 1.0), (100, 0.001), (1, 0.00001)])
 def test_depth_in_the_wrong_unit_is_told(folder, factor, depth_unit):
     rewrite_camera(folder, depth_unit=depth_unit)
     for path in folder.glob("*.png"):
