@@ -1,0 +1,165 @@
+"""Where the messages of an MCAP file lie: from its summary, or from a walk over what is left of a torn file.
+
+The file is opened for each read: nothing to close, and threads do not share a position.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, ChunkIndex, Message, MessageIndex, Metadata, MetadataIndex
+from mcap.stream_reader import breakup_chunk
+from mcap.writer import MCAP0_MAGIC
+from zstandard import ZstdError
+
+from spf.errors import SessionError
+
+__all__ = ["McapIndex", "Place", "has_magic", "index_file", "read_message"]
+
+#: What the MCAP library and the decompressor raise on damaged bytes.
+_DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError)
+
+_RECORD = struct.Struct("<BQ")
+_FOOTER = struct.Struct("<BQQQI")
+
+
+class Place(NamedTuple):
+    """Where a message lies: the offset of its chunk, and its channel in there."""
+
+    offset: int
+    channel: int
+
+
+class McapIndex(NamedTuple):
+    """Where the messages of a file lie.
+
+    Attributes:
+        places: topic → log time in ns → place.
+        metadata: name → metadata record.
+        whole: whether the file was finished by its writer.
+    """
+
+    places: dict[str, dict[int, Place]]
+    metadata: dict[str, dict[str, str]]
+    whole: bool
+
+
+def has_magic(path: Path) -> bool:
+    """Tell whether a path is a file that starts as MCAP files do."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+
+
+def index_file(path: Path) -> McapIndex:
+    """Find the messages of an MCAP file: quickly from its summary, else from all complete records."""
+    with path.open("rb") as file:
+        try:
+            return _from_summary(file) or _from_walk(file)
+        except _DAMAGE:
+            return _from_walk(file)
+
+
+def read_message(path: Path, index: McapIndex, topic: str, time: int) -> bytes:
+    """Read the data of one message.
+
+    Raises:
+        SessionError: the file changed or is damaged there.
+    """
+    offset, channel = index.places[topic][time]
+    try:
+        with path.open("rb") as file:
+            opcode, _, content = next(_records(file, offset))
+        if opcode != Opcode.CHUNK:
+            raise ValueError(opcode)
+        _, messages = _open_chunk(content)
+        return next(message.data for message in messages if (message.log_time, message.channel_id) == (time, channel))
+    except (*_DAMAGE, StopIteration, OSError) as error:
+        raise SessionError(
+            f"{path} is damaged or was changed while it was open (at byte {offset}): open it again, or record it again."
+        ) from error
+
+
+def _records(file: BinaryIO, offset: int) -> Iterator[tuple[int, int, bytes]]:
+    """Yield (opcode, offset, content) of all complete records from an offset on."""
+    size = file.seek(0, 2)
+    while offset + _RECORD.size <= size:
+        file.seek(offset)
+        opcode, length = _RECORD.unpack(file.read(_RECORD.size))
+        if offset + _RECORD.size + length > size:
+            return
+        yield opcode, offset, file.read(length)
+        if opcode == Opcode.FOOTER:
+            return
+        offset += _RECORD.size + length
+
+
+def _stream(content: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(content))
+
+
+def _open_chunk(content: bytes) -> tuple[dict[int, str], list[Message]]:
+    records = breakup_chunk(Chunk.read(_stream(content)), validate_crc=True)
+    channels = {record.id: record.topic for record in records if isinstance(record, Channel)}
+    return channels, [record for record in records if isinstance(record, Message)]
+
+
+def _from_summary(file: BinaryIO) -> McapIndex | None:
+    end = file.seek(0, 2) - len(MCAP0_MAGIC) - _FOOTER.size
+    if end < len(MCAP0_MAGIC):
+        return None
+    file.seek(end)
+    opcode, _, summary_start, _, _ = _FOOTER.unpack(file.read(_FOOTER.size))
+    if file.read() != MCAP0_MAGIC or opcode != Opcode.FOOTER or summary_start == 0:
+        return None
+    records = [(opcode, content) for opcode, _, content in _records(file, summary_start)]
+    channels = [Channel.read(_stream(content)) for opcode, content in records if opcode == Opcode.CHANNEL]
+    places: dict[str, dict[int, Place]] = {channel.topic: {} for channel in channels}
+    topics = {channel.id: channel.topic for channel in channels}
+    for opcode, content in records:
+        if opcode == Opcode.CHUNK_INDEX:
+            chunk = ChunkIndex.read(_stream(content))
+            for channel, time in _messages_of(file, chunk):
+                places[topics[channel]][time] = Place(chunk.chunk_start_offset, channel)
+    entries = [MetadataIndex.read(_stream(content)) for opcode, content in records if opcode == Opcode.METADATA_INDEX]
+    found = [Metadata.read(_stream(next(_records(file, entry.offset))[2])) for entry in entries]
+    return McapIndex(places, {record.name: record.metadata for record in found}, whole=True)
+
+
+def _messages_of(file: BinaryIO, chunk: ChunkIndex) -> Iterator[tuple[int, int]]:
+    """Yield (channel id, log time) of the messages of a chunk."""
+    if len(chunk.message_index_offsets) == 1 and chunk.message_start_time == chunk.message_end_time:
+        yield next(iter(chunk.message_index_offsets)), chunk.message_start_time
+        return
+    for offset in chunk.message_index_offsets.values():
+        index = MessageIndex.read(_stream(next(_records(file, offset))[2]))
+        yield from ((index.channel_id, time) for time, _ in index.records)
+
+
+def _from_walk(file: BinaryIO) -> McapIndex:
+    topics: dict[int, str] = {}
+    index = McapIndex({}, {}, whole=False)
+    try:
+        for opcode, offset, content in _records(file, len(MCAP0_MAGIC)):
+            if opcode == Opcode.METADATA:
+                record = Metadata.read(_stream(content))
+                index.metadata[record.name] = record.metadata
+            elif opcode == Opcode.CHUNK:
+                channels, messages = _open_chunk(content)
+                topics.update(channels)
+                for message in messages:
+                    places = index.places.setdefault(topics[message.channel_id], {})
+                    places[message.log_time] = Place(offset, message.channel_id)
+            elif opcode == Opcode.FOOTER:
+                return index._replace(whole=file.read() == MCAP0_MAGIC)
+    except _DAMAGE:
+        return index  # nothing behind the damage can be trusted
+    return index

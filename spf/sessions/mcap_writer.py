@@ -1,0 +1,227 @@
+"""Write the native session format, so that every frame written survives whatever happens to the program."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from mcap.writer import Writer
+from numpy.typing import NDArray
+
+from spf.errors import SessionError
+from spf.frame import JOINT_NAMES, Camera, Frame
+from spf.sessions.mcap_messages import (
+    CAMERA_TOPIC,
+    COLOUR_TOPIC,
+    DEPTH_TOPIC,
+    FREE_RECORD,
+    JOINTS_TOPIC,
+    MESSAGE_TYPES,
+    ORIENTATION_TOPIC,
+    POSE_TOPIC,
+    SESSION_RECORD,
+    Description,
+    definition,
+    encode_array,
+    encode_camera,
+    encode_image,
+    encode_joints,
+)
+from spf.sessions.session import Session, Side
+
+__all__ = ["MCAPWriter", "write_session"]
+
+_CAMERA_EVERY_NS = 1_000_000_000
+
+
+class MCAPWriter:
+    """Writes frames into a session file, in place: each one is in the file when :meth:`write` returns.
+
+    A program that is killed leaves a file that opens with all frames written so far.
+
+    Args:
+        path: the file to write.
+        camera: the camera of all frames.
+        depth_unit: metres per count of the uint16 images that depth is stored as.
+        side: the hand shown, if known.
+        joint_definition: whose joints the truth marks, ``"model"`` for the project's own.
+        hand_shape: the exact hand shape of a synthetic session, ready for JSON.
+        start_time_ns: nanoseconds since 1970 (UTC) of the frames' time 0, 0 if unknown.
+        metadata: whatever else is known, as text; ``sensor`` is the name of the sensor.
+        overwrite: replace a file that is there.
+
+    Raises:
+        SessionError: the file exists or cannot be made.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        camera: Camera,
+        depth_unit: float = 0.001,
+        side: Side | None = None,
+        joint_definition: str = "model",
+        hand_shape: dict[str, Any] | None = None,
+        start_time_ns: int = 0,
+        metadata: Mapping[str, str] | None = None,
+        overwrite: bool = False,
+    ) -> None:
+        self.path = Path(path)
+        self.camera = camera
+        self.depth_unit = depth_unit
+        self._start = start_time_ns
+        self._count = 0
+        self._last: int | None = None
+        self._last_camera: int | None = None
+        self._channels: dict[str, int] = {}
+        free = dict(metadata or {})
+        description = Description(depth_unit, side, joint_definition, hand_shape, start_time_ns, camera.model)
+        record = description.to_record(free)
+        self._file = _create(self.path, overwrite)
+        # A chunk is closed when it is larger than this: one chunk a message.
+        self._mcap = Writer(self._file, chunk_size=1)
+        self._mcap.start(profile="ros2")
+        self._mcap.add_metadata(SESSION_RECORD, record)
+        self._mcap.add_metadata(FREE_RECORD, free)
+
+    def write(self, frame: Frame) -> None:
+        """Append a frame; its depth is rounded to whole counts, its index is not stored.
+
+        Raises:
+            SessionError: its time is not after the last one's, its camera is another, its depth does not fit into
+                uint16 counts, or the disk is full.
+        """
+        stamp = self._start + round(frame.time * 1e9)
+        self._check(frame, stamp)
+        raw = self._counts(frame)
+        try:
+            if self._last_camera is None or stamp - self._last_camera >= _CAMERA_EVERY_NS:
+                self._add(CAMERA_TOPIC, stamp, encode_camera(self.camera, stamp))
+                self._last_camera = stamp
+            if frame.colour is not None:
+                self._add(COLOUR_TOPIC, stamp, encode_image(frame.colour, stamp))
+            if frame.truth is not None:
+                self._add(JOINTS_TOPIC, stamp, encode_joints(frame.truth.joints, stamp))
+                if frame.truth.pose is not None:
+                    self._add(POSE_TOPIC, stamp, encode_array(frame.truth.pose))
+                if frame.truth.orientation is not None:
+                    self._add(ORIENTATION_TOPIC, stamp, encode_array(frame.truth.orientation))
+            # Last, so that a frame that has its depth has everything.
+            self._add(DEPTH_TOPIC, stamp, encode_image(raw, stamp))
+            self._file.flush()
+        except OSError as error:
+            raise SessionError(f"{self.path} cannot be written: {error.strerror}.") from error
+        self._last = stamp
+        self._count += 1
+
+    def close(self) -> None:
+        """Write the index and close the file.
+
+        Raises:
+            SessionError: the disk is full.
+        """
+        if self._file.closed:
+            return
+        try:
+            with self._file:
+                self._mcap.finish()
+        except OSError as error:
+            raise SessionError(f"{self.path} cannot be written: {error.strerror}.") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        """Return the number of frames written."""
+        return self._count
+
+    def _check(self, frame: Frame, stamp: int) -> None:
+        if stamp < 0 or (self._last is not None and stamp <= self._last):
+            raise SessionError(f"Frame {self._count} at {frame.time} s is not later than the one before it.")
+        if frame.camera != self.camera or frame.depth.shape != (self.camera.height, self.camera.width):
+            raise SessionError(f"Frame {self._count} was taken by another camera than the session {self.path.name}.")
+        if frame.truth is not None and frame.truth.joints.shape != (len(JOINT_NAMES), 3):
+            raise SessionError(f"The truth of frame {self._count} has {len(frame.truth.joints)} joints, not 21.")
+
+    def _counts(self, frame: Frame) -> NDArray[np.uint16]:
+        counts = np.rint(frame.depth / self.depth_unit)
+        if not (counts.min() >= 0 and counts.max() <= 65535):
+            raise SessionError(
+                f"The depth of frame {self._count} does not fit into 0 to 65535 counts of {self.depth_unit:g} m: "
+                "give another depth_unit, and 0 where there is no reading."
+            )
+        return counts.astype(np.uint16)
+
+    def _add(self, topic: str, stamp: int, data: bytes) -> None:
+        if topic not in self._channels:
+            kind = MESSAGE_TYPES[topic]
+            schema = self._mcap.register_schema(kind, "ros2msg", definition(kind))
+            self._channels[topic] = self._mcap.register_channel(topic, "cdr", schema)
+        self._mcap.add_message(self._channels[topic], stamp, data, stamp, self._count)
+
+
+def write_session(
+    session: Session,
+    path: str | Path,
+    *,
+    overwrite: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write a whole session into the native format; the file has its name only when it is complete.
+
+    Args:
+        session: any session.
+        path: the file to write.
+        overwrite: replace a file that is there.
+        progress: called with (frames done, frames in all) after each frame.
+
+    Raises:
+        SessionError: the file exists or cannot be written, or a frame cannot be read.
+    """
+    target = Path(path)
+    part = target.with_name(f".{target.name}.part")
+    if target.exists() and not overwrite:
+        raise _exists(target)
+    writer = MCAPWriter(
+        part,
+        camera=session.camera,
+        depth_unit=session.depth_unit,
+        side=session.side,
+        joint_definition=session.joint_definition,
+        hand_shape=session.hand_shape,
+        start_time_ns=session.start_time_ns,
+        metadata=session.metadata,
+        overwrite=True,
+    )
+    try:
+        with writer:
+            for done, frame in enumerate(session, 1):
+                writer.write(frame)
+                if progress is not None:
+                    progress(done, len(session))
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _exists(path: Path) -> SessionError:
+    return SessionError(f"{path} is already there: give another name, or allow it to be overwritten.")
+
+
+def _create(path: Path, overwrite: bool) -> Any:
+    try:
+        return path.open("wb" if overwrite else "xb")
+    except FileExistsError as error:
+        raise _exists(path) from error
+    except OSError as error:
+        raise SessionError(f"{path} cannot be written: {error.strerror}.") from error

@@ -1,0 +1,127 @@
+"""PNG images, whole or refused: OpenCV shows the readable part of a torn file without a word, a tracker must not."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.errors import SessionError
+
+__all__ = ["PngHeader", "png_header", "read_colour_png", "read_depth_png", "read_packed_depth_png"]
+
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_GREY, _RGB = 0, 2
+_KINDS = {0: "grey", 2: "colour", 3: "palette", 4: "grey with alpha", 6: "colour with alpha"}
+
+
+class PngHeader(NamedTuple):
+    """What a PNG says of itself before its pixels.
+
+    Attributes:
+        width, height: in pixels.
+        bits: per channel.
+        kind: the PNG colour type.
+    """
+
+    width: int
+    height: int
+    bits: int
+    kind: int
+
+    def __str__(self) -> str:
+        return f"{self.width}×{self.height} {self.bits}-bit {_KINDS.get(self.kind, 'unknown')} PNG"
+
+
+def png_header(path: Path) -> PngHeader:
+    """Read the header of a PNG without its pixels.
+
+    Raises:
+        SessionError: the file is missing, empty or no PNG.
+    """
+    return _header(_read(path, 33), path)
+
+
+def read_depth_png(path: Path) -> NDArray[np.uint16]:
+    """Read a 16-bit grey PNG.
+
+    Returns:
+        (H, W) raw counts.
+
+    Raises:
+        SessionError: the file is missing, empty, torn, or no 16-bit grey PNG.
+    """
+    return _decode(path, bits=16, kind=_GREY, wanted="a 16-bit grey PNG: store depth as uint16 counts")
+
+
+def read_packed_depth_png(path: Path) -> NDArray[np.uint16]:
+    """Read depth packed in an 8-bit colour PNG: high byte in green, low byte in blue (NYU).
+
+    Returns:
+        (H, W) raw counts.
+
+    Raises:
+        SessionError: the file is missing, empty, torn, or no 8-bit colour PNG.
+    """
+    image = _decode(path, bits=8, kind=_RGB, wanted="an 8-bit colour PNG with depth in green and blue")
+    blue, green = image[..., 0].astype(np.uint16), image[..., 1].astype(np.uint16)
+    return (green << 8) | blue
+
+
+def read_colour_png(path: Path) -> NDArray[np.uint8]:
+    """Read an 8-bit colour PNG.
+
+    Returns:
+        (H, W, 3) RGB.
+
+    Raises:
+        SessionError: the file is missing, empty, torn, or no 8-bit colour PNG.
+    """
+    image = _decode(path, bits=8, kind=_RGB, wanted="an 8-bit colour PNG")
+    return np.ascontiguousarray(image[..., ::-1], dtype=np.uint8)
+
+
+def _read(path: Path, size: int = -1) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(size)
+    except OSError as error:
+        raise SessionError(f"The image {path} cannot be read: {error.strerror}.") from error
+
+
+def _header(data: bytes, path: Path) -> PngHeader:
+    if not data:
+        raise SessionError(f"The image {path} is empty (0 bytes): copy it again, or take it out of the folder.")
+    if not data.startswith(_SIGNATURE) or len(data) < 33:
+        raise SessionError(f"The file {path} is not a PNG image: copy it again, or take it out of the folder.")
+    width, height, bits, kind = struct.unpack(">IIBB", data[16:26])
+    return PngHeader(width, height, bits, kind)
+
+
+def _is_whole(data: bytes) -> bool:
+    position = len(_SIGNATURE)
+    while position + 12 <= len(data):
+        (length,) = struct.unpack_from(">I", data, position)
+        end = position + 8 + length
+        if end + 4 > len(data) or zlib.crc32(data[position + 4 : end]) != struct.unpack_from(">I", data, end)[0]:
+            return False
+        if data[position + 4 : position + 8] == b"IEND":
+            return True
+        position = end + 4
+    return False
+
+
+def _decode(path: Path, bits: int, kind: int, wanted: str) -> NDArray[Any]:
+    data = _read(path)
+    header = _header(data, path)
+    if (header.bits, header.kind) != (bits, kind):
+        raise SessionError(f"The image {path} is a {header}, not {wanted}.")
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if _is_whole(data) else None
+    if image is None:
+        raise SessionError(f"The image {path} is torn: copy it again, or take it out of the folder.")
+    return image

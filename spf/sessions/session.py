@@ -1,0 +1,133 @@
+"""Session: a recording of depth frames, read by random access, whatever file format it is stored in."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.frame import Camera, Frame, Truth
+
+__all__ = ["Session", "Side"]
+
+Side = Literal["left", "right"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Session(ABC):
+    """A depth recording: ``len(session)`` frames, ``session[i]`` at random and from several threads.
+
+    A reader subclasses it and says how the raw depth, the colour and the truth of one frame are read.
+
+    Attributes:
+        uri: what it was opened with.
+        name: short name for tables and titles.
+        format: name of its format, as in the table of formats.
+        camera: the camera of all its frames.
+        times_ns: (N,) int64 nanoseconds since the first frame, increasing.
+        depth_unit: metres per raw count; ``np.rint(frame.depth / depth_unit)`` is the raw uint16 image.
+        side: the hand that it shows, None where the format does not say.
+        joint_definition: whose joints its truth marks: ``"model"`` for the project's own, else the data set's name.
+        has_truth: whether frames carry a truth.
+        hand_shape: the exact hand shape of a synthetic session, ready for JSON, else None.
+        start_time_ns: nanoseconds since 1970 (UTC) of the first frame, 0 where unknown.
+        metadata: whatever else is known, as text (``sensor``, ``dataset``, …).
+        warnings: one sentence for everything that a user should know of how it was read.
+    """
+
+    uri: str
+    name: str
+    format: str
+    camera: Camera
+    times_ns: NDArray[np.int64]
+    depth_unit: float = 0.001
+    side: Side | None = None
+    joint_definition: str = "model"
+    has_truth: bool = False
+    hand_shape: dict[str, Any] | None = None
+    start_time_ns: int = 0
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @abstractmethod
+    def raw_depth(self, index: int) -> NDArray[np.uint16]:
+        """Return the (H, W) raw depth counts of a frame, 0 where the sensor has no reading.
+
+        Raises:
+            SessionError: the frame cannot be read.
+        """
+
+    def colour(self, index: int) -> NDArray[np.uint8] | None:
+        """Return the (H, W, 3) RGB image of a frame, registered to its depth, or None."""
+        return None
+
+    def truth(self, index: int) -> Truth | None:
+        """Return the ground truth of a frame, or None."""
+        return None
+
+    @cached_property
+    def times(self) -> NDArray[np.float64]:
+        """(N,) seconds since the first frame."""
+        return self.times_ns / 1e9
+
+    def __len__(self) -> int:
+        return len(self.times_ns)
+
+    def __getitem__(self, index: int) -> Frame:
+        """Return one frame; a negative index counts from the end.
+
+        Raises:
+            IndexError: there is no such frame.
+            SessionError: the frame cannot be read.
+        """
+        position = operator.index(index)
+        if not -len(self) <= position < len(self):
+            raise IndexError(f"Frame {position} is outside the {len(self)} frames of {self.name}.")
+        position %= len(self)
+        return Frame(
+            index=position,
+            time=float(self.times[position]),
+            depth=self.raw_depth(position) * np.float32(self.depth_unit),
+            camera=self.camera,
+            colour=self.colour(position),
+            truth=self.truth(position),
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        return (self[index] for index in range(len(self)))
+
+    def fingerprint(self) -> str:
+        """Return the SHA-256 of camera, depth unit, times and all raw depth: equal for equal recordings in any format.
+
+        Raises:
+            SessionError: a frame cannot be read.
+        """
+        return self._fingerprint
+
+    @cached_property
+    def _fingerprint(self) -> str:
+        digest = hashlib.sha256(json.dumps([*self.camera, self.depth_unit]).encode())
+        digest.update(self.times_ns.astype("<i8").tobytes())
+        for index in range(len(self)):
+            digest.update(self.raw_depth(index).astype("<u2").tobytes())
+        return digest.hexdigest()
+
+    def close(self) -> None:  # noqa: B027 - only live sources hold something to give back
+        """Give back what the session holds (files are opened for each read, so nothing by default)."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
