@@ -1,0 +1,208 @@
+"""Sensor models by name: from clean depth to what such a sensor delivers, seeded.
+
+In the order of the light: ragged edges, flying pixels, the stereo shadow, noise, disparity steps, lost surfaces, holes
+and counts. Noise is Gaussian with the standard deviation
+
+    σ(z) = floor + quadratic · z²
+
+of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.frame import Camera
+
+__all__ = ["SENSORS", "Sensor", "measure", "noise_sd"]
+
+Image = NDArray[np.float32]
+
+_EDGE_STEP = 0.02  # m of depth between neighbours that makes an edge
+_GRAINY_PART = 0.4  # of the variance
+
+
+class Sensor(NamedTuple):
+    """A depth sensor.
+
+    Attributes:
+        meaning: one line.
+        camera: its depth camera.
+        fps: frames a second.
+        depth_unit: metres per count.
+        near, far: m, the range in which it reads.
+        distance: m, where a hand is usually held.
+        noise_floor: m, and ``noise_quadratic``: 1/m: the two terms of σ(z).
+        grain: pixels over which a part of the noise is correlated; 1 for none.
+        ragged: pixels, standard deviation by which edges are displaced.
+        flying: probability that an edge pixel reads somewhere between the two surfaces.
+        baseline: m between the two eyes of a stereo or structured-light sensor, 0 for none: it shadows and has …
+        disparity_step: … depth in steps of this many pixels of disparity.
+        steepest: slope of the surface (tangent of the angle to the line of sight) above which it mostly reads nothing.
+        holes: fraction of the area without reading.
+        missing_phalanx, pushed_finger: fraction of the frames with these faults.
+    """
+
+    meaning: str
+    camera: Camera
+    fps: float
+    depth_unit: float
+    near: float
+    far: float
+    distance: float
+    noise_floor: float = 0.0
+    noise_quadratic: float = 0.0
+    grain: int = 1
+    ragged: float = 0.0
+    flying: float = 0.0
+    baseline: float = 0.0
+    disparity_step: float = 0.0
+    steepest: float = 0.0
+    holes: float = 0.0
+    missing_phalanx: float = 0.0
+    pushed_finger: float = 0.0
+
+
+#: All sensors by name.
+SENSORS: dict[str, Sensor] = {
+    "ideal": Sensor(
+        "no noise, steps of 0.1 mm",
+        Camera(640, 480, 475.0, 475.0, 319.5, 239.5),
+        *(30.0, 0.0001, 0.1, 4.0, 0.45),
+    ),
+    "kinect2": Sensor(
+        "time of flight, Kinect v2: 1-3 mm of noise, flying pixels at the edges",
+        Camera(512, 424, 363.9, 363.9, 255.4, 206.3),
+        *(30.0, 0.001, 0.45, 4.5, 0.65),
+        **{"noise_floor": 0.0010, "noise_quadratic": 0.0012, "grain": 3, "ragged": 0.5, "flying": 0.5},
+        **{"steepest": 6.0, "holes": 0.003},
+    ),
+    "senz3d": Sensor(
+        "time of flight, Creative Senz3D: 3-8 mm of noise, ragged edges",
+        Camera(320, 240, 224.5, 230.5, 160.0, 120.0),
+        *(30.0, 0.001, 0.15, 1.0, 0.38),
+        **{"noise_floor": 0.0015, "noise_quadratic": 0.018, "grain": 3, "ragged": 0.8, "flying": 0.3},
+        **{"steepest": 4.0, "holes": 0.01},
+    ),
+    "realsense": Sensor(
+        "active stereo, RealSense D415: noise and steps that grow with the distance squared, shadows, holes",
+        Camera(640, 480, 610.0, 610.0, 319.5, 239.5),
+        *(30.0, 0.001, 0.3, 3.0, 0.5),
+        **{"noise_floor": 0.0002, "noise_quadratic": 0.0045, "grain": 7, "ragged": 1.2, "baseline": 0.055},
+        **{"disparity_step": 0.03125, "steepest": 3.0, "holes": 0.02},
+    ),
+    "structured_light": Sensor(
+        "the paper's Fig. 2: orthographic, holes, a phalanx missing, a finger pushed into the scene",
+        Camera(384, 288, 1100.0, 1100.0, 191.5, 143.5, "orthographic"),
+        *(12.5, 0.0001, 0.1, 2.0, 0.5),
+        **{"noise_floor": 0.0008, "grain": 5, "ragged": 1.5, "steepest": 2.5, "holes": 0.04},
+        **{"missing_phalanx": 0.25, "pushed_finger": 0.2},
+    ),
+}
+
+
+def noise_sd(sensor: Sensor, z: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return σ(z) in metres for depths in metres."""
+    return sensor.noise_floor + sensor.noise_quadratic * z**2
+
+
+def measure(sensor: Sensor, depth: Image, rng: np.random.Generator) -> NDArray[np.uint16]:
+    """Take a picture of a clean depth map.
+
+    Args:
+        sensor: the sensor.
+        depth: (H, W) m; 0 or beyond the range where there is nothing.
+        rng: the frame's own generator.
+
+    Returns:
+        (H, W) counts of ``sensor.depth_unit``, 0 where there is no reading.
+    """
+    z = np.where((depth >= sensor.near) & (depth <= sensor.far), depth, np.float32(0.0)).astype(np.float32)
+    steep = _slope(sensor, z)
+    if sensor.ragged > 0.0:
+        z = _ragged(z, sensor.ragged, rng)
+    if sensor.flying > 0.0:
+        z = _flying(z, sensor.flying, rng)
+    if sensor.baseline > 0.0:
+        z = _shadowed(sensor, z)
+    z = np.where(z > 0.0, z + noise_sd(sensor, z) * _noise(z.shape, sensor.grain, rng), z).astype(np.float32)
+    if sensor.disparity_step > 0.0:
+        z = _stepped(sensor, z)
+    if sensor.steepest > 0.0:
+        z[(steep > sensor.steepest) & (rng.random(z.shape, dtype=np.float32) < 0.7)] = 0.0
+    if sensor.holes > 0.0:
+        z = _holed(z, sensor.holes, rng)
+    z[(z < sensor.near) | (z > sensor.far)] = 0.0
+    return np.rint(z / np.float32(sensor.depth_unit)).astype(np.uint16)
+
+
+def _slope(sensor: Sensor, z: Image) -> Image:
+    """Tangent of the angle between the line of sight and the surface's normal, by central differences."""
+    du, dv = cv2.Sobel(z, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(z, cv2.CV_32F, 0, 1, scale=0.125)
+    pixel = np.maximum(z, sensor.near) if sensor.camera.model == "pinhole" else np.float32(1.0)
+    return cv2.magnitude(du * np.float32(sensor.camera.fx) / pixel, dv * np.float32(sensor.camera.fy) / pixel)
+
+
+def _ragged(z: Image, spread: float, rng: np.random.Generator) -> Image:
+    """Read every pixel a little beside itself."""
+    height, width = z.shape
+    u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
+    jitter = np.float32(spread) * rng.standard_normal((2, height, width), dtype=np.float32)
+    return cv2.remap(z, u + jitter[0], v + jitter[1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+
+
+def _flying(z: Image, probability: float, rng: np.random.Generator) -> Image:
+    """Mix near and far surface at depth edges; beside nothing, some centimetres are made up."""
+    kernel = np.ones((3, 3), np.uint8)
+    farthest = cv2.dilate(z, kernel)
+    nothing = (cv2.erode(z, kernel) == 0.0) & (z > 0.0)
+    edge = np.flatnonzero((((farthest - z) > _EDGE_STEP) & (z > 0.0)) | nothing)
+    edge = edge[rng.random(len(edge)) < probability]
+    beyond = np.maximum(farthest.ravel()[edge] - z.ravel()[edge], 0.04 * nothing.ravel()[edge])
+    result = z.copy()
+    result.ravel()[edge] += (rng.random(len(edge)) * beyond).astype(np.float32)
+    return result
+
+
+def _shadowed(sensor: Sensor, z: Image) -> Image:
+    """Blank what the right eye cannot see: the band beside a nearer surface, as wide as the jump in disparity."""
+    reach = sensor.camera.fx * sensor.baseline
+    disparity = np.divide(reach, z, out=np.zeros_like(z), where=z > 0.0)
+    columns = np.arange(z.shape[1], dtype=np.float32)
+    seen_at = columns - disparity  # column in the right eye; a nearer surface further right may already cover it
+    after = np.minimum.accumulate(np.where(z > 0.0, seen_at, np.inf)[:, ::-1], axis=1)[:, ::-1]
+    covered = np.zeros(z.shape, dtype=bool)
+    covered[:, :-1] = after[:, 1:] < seen_at[:, :-1] - 1.0
+    return np.where(covered, np.float32(0.0), z)
+
+
+def _stepped(sensor: Sensor, z: Image) -> Image:
+    reach = np.float32(sensor.camera.fx * sensor.baseline)
+    step = np.float32(sensor.disparity_step)
+    disparity = np.divide(reach, z, out=np.zeros_like(z), where=z > 0.0)
+    steps = np.maximum(np.rint(disparity / step), 1.0) * step
+    return np.where(z > 0.0, reach / steps, z).astype(np.float32)
+
+
+def _noise(shape: tuple[int, ...], grain: int, rng: np.random.Generator) -> Image:
+    """Unit normal noise, of which a part is correlated over ``grain`` pixels."""
+    white = rng.standard_normal(shape, dtype=np.float32)
+    if grain <= 1:
+        return white
+    grainy = cv2.blur(rng.standard_normal(shape, dtype=np.float32), (grain, grain)) * np.float32(grain)
+    return np.float32(np.sqrt(1.0 - _GRAINY_PART)) * white + np.float32(np.sqrt(_GRAINY_PART)) * grainy
+
+
+def _holed(z: Image, fraction: float, rng: np.random.Generator) -> Image:
+    """Blank blobs that take this fraction of the pixels that have a reading."""
+    height, width = z.shape
+    coarse = rng.standard_normal((height // 4 + 2, width // 4 + 2), dtype=np.float32)
+    field = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
+    inside = field[z > 0.0]
+    if len(inside) == 0:
+        return z
+    return np.where(field > np.quantile(inside, 1.0 - fraction), np.float32(0.0), z)
