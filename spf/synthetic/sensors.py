@@ -24,6 +24,7 @@ Image = NDArray[np.float32]
 
 _EDGE_STEP = 0.02  # m of depth between neighbours that makes an edge
 _GRAINY_PART = 0.4  # of the variance
+_STEEP_LOST = 0.7  # of the pixels on surfaces that are too steep
 
 
 class Sensor(NamedTuple):
@@ -70,44 +71,85 @@ class Sensor(NamedTuple):
 #: All sensors by name.
 SENSORS: dict[str, Sensor] = {
     "ideal": Sensor(
-        "no noise, steps of 0.1 mm",
-        Camera(640, 480, 475.0, 475.0, 319.5, 239.5),
-        *(30.0, 0.0001, 0.1, 4.0, 0.45),
+        meaning="no noise, steps of 0.1 mm",
+        camera=Camera(640, 480, 475.0, 475.0, 319.5, 239.5),
+        fps=30.0,
+        depth_unit=0.0001,
+        near=0.1,
+        far=4.0,
+        distance=0.45,
     ),
     "kinect2": Sensor(
-        "time of flight, Kinect v2: 1-3 mm of noise, flying pixels at the edges",
-        Camera(512, 424, 363.9, 363.9, 255.4, 206.3),
-        *(30.0, 0.001, 0.45, 4.5, 0.65),
-        **{"noise_floor": 0.0010, "noise_quadratic": 0.0012, "grain": 3, "ragged": 0.5, "flying": 0.5},
-        **{"steepest": 6.0, "holes": 0.003},
+        meaning="time of flight, Kinect v2: 1-3 mm of noise, flying pixels at the edges",
+        camera=Camera(512, 424, 363.9, 363.9, 255.4, 206.3),
+        fps=30.0,
+        depth_unit=0.001,
+        near=0.45,
+        far=4.5,
+        distance=0.65,
+        noise_floor=0.0010,
+        noise_quadratic=0.0012,
+        grain=3,
+        ragged=0.5,
+        flying=0.5,
+        steepest=6.0,
+        holes=0.003,
     ),
     "senz3d": Sensor(
-        "time of flight, Creative Senz3D: 3-8 mm of noise, ragged edges",
-        Camera(320, 240, 224.5, 230.5, 160.0, 120.0),
-        *(30.0, 0.001, 0.15, 1.0, 0.38),
-        **{"noise_floor": 0.0015, "noise_quadratic": 0.018, "grain": 3, "ragged": 0.8, "flying": 0.3},
-        **{"steepest": 4.0, "holes": 0.01},
+        meaning="time of flight, Creative Senz3D: 3-8 mm of noise, ragged edges",
+        camera=Camera(320, 240, 224.5, 230.5, 160.0, 120.0),
+        fps=30.0,
+        depth_unit=0.001,
+        near=0.15,
+        far=1.0,
+        distance=0.38,
+        noise_floor=0.0015,
+        noise_quadratic=0.018,
+        grain=3,
+        ragged=0.8,
+        flying=0.3,
+        steepest=4.0,
+        holes=0.01,
     ),
     "realsense": Sensor(
-        "active stereo, RealSense D415: noise and steps that grow with the distance squared, shadows, holes",
-        Camera(640, 480, 610.0, 610.0, 319.5, 239.5),
-        *(30.0, 0.001, 0.3, 3.0, 0.5),
-        **{"noise_floor": 0.0002, "noise_quadratic": 0.0045, "grain": 7, "ragged": 1.2, "baseline": 0.055},
-        **{"disparity_step": 0.03125, "steepest": 3.0, "holes": 0.02},
+        meaning="active stereo, RealSense D415: noise and steps that grow with the distance squared, shadows, holes",
+        camera=Camera(640, 480, 610.0, 610.0, 319.5, 239.5),
+        fps=30.0,
+        depth_unit=0.001,
+        near=0.3,
+        far=3.0,
+        distance=0.5,
+        noise_floor=0.0002,
+        noise_quadratic=0.0045,
+        grain=7,
+        ragged=1.2,
+        baseline=0.055,
+        disparity_step=0.03125,
+        steepest=3.0,
+        holes=0.02,
     ),
     "structured_light": Sensor(
-        "the paper's Fig. 2: orthographic, holes, a phalanx missing, a finger pushed into the scene",
-        Camera(384, 288, 1100.0, 1100.0, 191.5, 143.5, "orthographic"),
-        *(12.5, 0.0001, 0.1, 2.0, 0.5),
-        **{"noise_floor": 0.0008, "grain": 5, "ragged": 1.5, "steepest": 2.5, "holes": 0.04},
-        **{"missing_phalanx": 0.25, "pushed_finger": 0.2},
+        meaning="the paper's Fig. 2: orthographic, holes, a phalanx missing, a finger pushed into the scene",
+        camera=Camera(384, 288, 1100.0, 1100.0, 191.5, 143.5, "orthographic"),
+        fps=12.5,
+        depth_unit=0.0001,
+        near=0.1,
+        far=2.0,
+        distance=0.5,
+        noise_floor=0.0008,
+        grain=5,
+        ragged=1.5,
+        steepest=2.5,
+        holes=0.04,
+        missing_phalanx=0.25,
+        pushed_finger=0.2,
     ),
 }
 
 
-def noise_sd(sensor: Sensor, z: NDArray[np.floating]) -> NDArray[np.floating]:
+def noise_sd(sensor: Sensor, z: Image) -> Image:
     """Return σ(z) in metres for depths in metres."""
-    return sensor.noise_floor + sensor.noise_quadratic * z**2
+    return np.float32(sensor.noise_floor) + np.float32(sensor.noise_quadratic) * z * z
 
 
 def measure(sensor: Sensor, depth: Image, rng: np.random.Generator) -> NDArray[np.uint16]:
@@ -121,38 +163,63 @@ def measure(sensor: Sensor, depth: Image, rng: np.random.Generator) -> NDArray[n
     Returns:
         (H, W) counts of ``sensor.depth_unit``, 0 where there is no reading.
     """
-    z = np.where((depth >= sensor.near) & (depth <= sensor.far), depth, np.float32(0.0)).astype(np.float32)
-    steep = _slope(sensor, z)
+    in_range = (depth >= sensor.near) & (depth <= sensor.far)
+    counts = np.zeros(depth.shape, np.uint16)
+    rows, columns = np.flatnonzero(in_range.any(axis=1)), np.flatnonzero(in_range.any(axis=0))
+    if len(rows) == 0:
+        return counts
+    margin = int(np.ceil(3.0 * sensor.ragged)) + 1
+    window = (
+        slice(max(rows[0] - margin, 0), rows[-1] + 1 + margin),
+        slice(max(columns[0] - margin, 0), columns[-1] + 1 + margin),
+    )
+    z = _measured(sensor, np.where(in_range[window], depth[window], np.float32(0.0)), rng)
+    z[(z < sensor.near) | (z > sensor.far)] = 0.0
+    counts[window] = (z * np.float32(1.0 / sensor.depth_unit) + np.float32(0.5)).astype(np.uint16)
+    return counts
+
+
+def _measured(sensor: Sensor, clean: Image, rng: np.random.Generator) -> Image:
+    """What the sensor makes of the part of a picture that it can see; 0 is nothing."""
+    z = clean.copy()
     if sensor.ragged > 0.0:
         z = _ragged(z, sensor.ragged, rng)
     if sensor.flying > 0.0:
         z = _flying(z, sensor.flying, rng)
     if sensor.baseline > 0.0:
         z = _shadowed(sensor, z)
-    z = np.where(z > 0.0, z + noise_sd(sensor, z) * _noise(z.shape, sensor.grain, rng), z).astype(np.float32)
+    if sensor.noise_floor > 0.0 or sensor.noise_quadratic > 0.0:
+        z += (z > 0.0) * noise_sd(sensor, z) * _noise(z.shape, sensor.grain, rng)
     if sensor.disparity_step > 0.0:
         z = _stepped(sensor, z)
     if sensor.steepest > 0.0:
-        z[(steep > sensor.steepest) & (rng.random(z.shape, dtype=np.float32) < 0.7)] = 0.0
+        steep = np.flatnonzero(_slope(sensor, clean) > sensor.steepest)
+        z.ravel()[steep[rng.random(len(steep)) < _STEEP_LOST]] = 0.0
     if sensor.holes > 0.0:
         z = _holed(z, sensor.holes, rng)
-    z[(z < sensor.near) | (z > sensor.far)] = 0.0
-    return np.rint(z / np.float32(sensor.depth_unit)).astype(np.uint16)
+    return z
 
 
 def _slope(sensor: Sensor, z: Image) -> Image:
     """Tangent of the angle between the line of sight and the surface's normal, by central differences."""
     du, dv = cv2.Sobel(z, cv2.CV_32F, 1, 0, scale=0.125), cv2.Sobel(z, cv2.CV_32F, 0, 1, scale=0.125)
-    pixel = np.maximum(z, sensor.near) if sensor.camera.model == "pinhole" else np.float32(1.0)
-    return cv2.magnitude(du * np.float32(sensor.camera.fx) / pixel, dv * np.float32(sensor.camera.fy) / pixel)
+    slope = cv2.magnitude(du * np.float32(sensor.camera.fx), dv * np.float32(sensor.camera.fy))
+    if sensor.camera.model == "pinhole":
+        slope = slope / np.maximum(z, np.float32(sensor.near))
+    return np.asarray(slope, dtype=np.float32)
 
 
 def _ragged(z: Image, spread: float, rng: np.random.Generator) -> Image:
-    """Read every pixel a little beside itself."""
+    """Let every pixel near an edge read a little beside itself."""
+    reach = 2 * int(np.ceil(2.0 * spread)) + 1
+    kernel = np.ones((reach, reach), np.uint8)
+    edge = np.flatnonzero(cv2.dilate(z, kernel) - cv2.erode(z, kernel) > _EDGE_STEP)
     height, width = z.shape
-    u, v = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
-    jitter = np.float32(spread) * rng.standard_normal((2, height, width), dtype=np.float32)
-    return cv2.remap(z, u + jitter[0], v + jitter[1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    dv, du = np.rint(rng.normal(0.0, spread, (2, len(edge)))).astype(np.intp)
+    v, u = np.clip(edge // width + dv, 0, height - 1), np.clip(edge % width + du, 0, width - 1)
+    result = z.copy()
+    result.ravel()[edge] = z[v, u]
+    return result
 
 
 def _flying(z: Image, probability: float, rng: np.random.Generator) -> Image:
@@ -193,7 +260,7 @@ def _noise(shape: tuple[int, ...], grain: int, rng: np.random.Generator) -> Imag
     white = rng.standard_normal(shape, dtype=np.float32)
     if grain <= 1:
         return white
-    grainy = cv2.blur(rng.standard_normal(shape, dtype=np.float32), (grain, grain)) * np.float32(grain)
+    grainy = np.float32(grain) * cv2.blur(rng.standard_normal(shape, dtype=np.float32), (grain, grain))
     return np.float32(np.sqrt(1.0 - _GRAINY_PART)) * white + np.float32(np.sqrt(_GRAINY_PART)) * grainy
 
 
