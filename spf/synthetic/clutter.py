@@ -14,14 +14,14 @@ from spf.hand.model import Hand, load_hand
 from spf.kernels.render import FAR
 from spf.synthetic.motions import MOTIONS
 from spf.synthetic.solids import Mesh, draw, ellipsoid, plane_depth, tube
-from spf.synthetic.trajectory import Trajectory, View, make_trajectory, mirrored_trajectory
+from spf.synthetic.trajectory import Trajectory, View, make_trajectory, minimum_jerk, mirrored_trajectory
 
 __all__ = ["CLUTTER", "Clutter", "Place", "moving_meshes"]
 
 Array = NDArray[np.float64]
 
 _FOREARM = 0.22  # m from wrist to elbow of the standard hand
-_FOREARM_RINGS = 12
+_FOREARM_RINGS = 14
 _STANDARD_LENGTH = 0.19  # m, wrist to middle tip
 
 
@@ -81,8 +81,11 @@ def _body(place: Place) -> Clutter:
     chin = y + place.rng.uniform(-0.12, -0.02)
     head = ellipsoid((middle, chin - 0.1, back), (0.075, 0.115, 0.1))
     neck = ellipsoid((middle, chin + 0.04, back + 0.03), (0.055, 0.1, 0.055))
-    trunk = ellipsoid((middle, chin + 0.4, back + 0.05), (0.21, 0.34, 0.12), rings=25)
-    shoulders = ellipsoid((middle, chin + 0.16, back + 0.04), (0.2, 0.09, 0.09))
+    down = np.linspace(0.0, 0.55, 12)
+    centres = np.stack([np.full(12, middle), chin + 0.13 + down, np.full(12, back + 0.05)], axis=1)
+    widths = np.stack([0.09 + 0.02 * np.sqrt(down), 0.12 + 0.09 * np.minimum(down / 0.05, 1.0)], axis=1)
+    trunk = tube(centres, widths, np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
+    shoulders = ellipsoid((middle, chin + 0.17, back + 0.04), (0.24, 0.075, 0.08))
     shoulder = np.array([middle - outward * 0.19, chin + 0.17, back + 0.04])
     return Clutter(draw([head, neck, trunk, shoulders], place.camera), shoulder=shoulder)
 
@@ -145,7 +148,7 @@ def moving_meshes(clutter: Clutter, hand: Hand, posed: PosedHand | None, frame: 
         forearm, elbow = _forearm_mesh(hand, posed)
         meshes.append(forearm)
         if clutter.shoulder is not None:
-            meshes.append(_upper_arm(elbow, clutter.shoulder))
+            meshes += [_upper_arm(elbow, clutter.shoulder), ellipsoid(elbow, (0.048, 0.048, 0.048))]
     if clutter.second is not None:
         other, moves = clutter.second
         second = pose_hand(other, moves.poses[frame], moves.orientations[frame])
@@ -156,27 +159,28 @@ def moving_meshes(clutter: Clutter, hand: Hand, posed: PosedHand | None, frame: 
 def _forearm_mesh(hand: Hand, posed: PosedHand) -> tuple[Mesh, Array]:
     """A tapered tube from inside the wrist down to the elbow, bent at the wrist towards "down and away"."""
     wrist = posed.frames[0]
-    width, thickness, stub = _wrist_section(hand)
+    half, centre = _wrist_section(hand)
     size = hand.length / _STANDARD_LENGTH
-    direction = wrist[:, 2] + 0.6 * np.array([0.0, 0.9, 0.45])
-    direction /= np.linalg.norm(direction)
-    across = wrist[:, 0] - direction * (wrist[:, 0] @ direction)
-    across /= np.linalg.norm(across)
-    start = wrist[:, 3] + (stub - 0.012 * size) * wrist[:, 2]
     along = np.linspace(0.0, 1.0, _FOREARM_RINGS)
-    bulge = 1.0 + 0.45 * np.sin(0.5 * np.pi * np.minimum(along * 1.4, 1.0))
-    radii = bulge[:, None] * 0.97 * np.array([width, thickness]) + np.outer(along, [0.0, 0.006 * size])
-    centres = start + np.outer(along * _FOREARM * size, direction)
-    second = np.cross(direction, across)
-    return tube(centres, radii, np.array([across, second])), centres[-1]
+    bend = minimum_jerk(along / 0.35)[:, None]  # the arm leaves the wrist straight and then turns
+    directions = wrist[:, 2] + bend * 0.6 * np.array([0.0, 0.9, 0.45])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    first = wrist[:, 0] - directions * (directions @ wrist[:, 0])[:, None]
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    start = wrist[:, 3] + wrist[:, :3] @ centre
+    steps = np.diff(along, prepend=0.0)[:, None] * _FOREARM * size * directions
+    bulge = 0.94 + 0.5 * np.sin(0.5 * np.pi * np.minimum(along * 1.4, 1.0))
+    radii = bulge[:, None] * half + np.outer(along, [0.0, 0.006 * size])
+    centres = start + np.cumsum(steps, axis=0)
+    return tube(centres, radii, np.stack([first, np.cross(directions, first)], axis=1)), centres[-1]
 
 
-def _wrist_section(hand: Hand) -> tuple[float, float, float]:
-    """Half width and half thickness of the hand's open end, and how far behind the wrist joint it is; m."""
-    z = hand.skin.vertices[:, 2]
-    end = hand.skin.vertices[z > z.max() - 0.006]
-    width, thickness = 0.5 * np.ptp(end[:, 0]), 0.5 * np.ptp(end[:, 1])
-    return float(width), float(thickness), float(z.max() - hand.skeleton.bind[0, 2, 3])
+def _wrist_section(hand: Hand) -> tuple[Array, Array]:
+    """Half width and half thickness (2,) of the hand at the wrist joint, and the section's centre from it (3,); m."""
+    wrist = hand.skeleton.bind[0, :, 3]
+    near = np.abs(hand.skin.vertices[:, 2] - wrist[2]) < 0.05 * hand.length
+    low, high = hand.skin.vertices[near].min(axis=0), hand.skin.vertices[near].max(axis=0)
+    return 0.5 * (high - low)[:2], (0.5 * (low + high) - wrist) * (1.0, 1.0, 0.0)
 
 
 def _upper_arm(elbow: Array, shoulder: Array) -> Mesh:
@@ -184,6 +188,6 @@ def _upper_arm(elbow: Array, shoulder: Array) -> Mesh:
     direction /= np.linalg.norm(direction)
     across = np.cross(direction, [0.0, 0.0, 1.0] if abs(direction[2]) < 0.9 else [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
-    along = np.linspace(-0.06, 1.0, 10)
+    along = np.linspace(0.0, 1.0, 10)
     radii = np.repeat(np.linspace(0.045, 0.06, 10)[:, None], 2, axis=1)
     return tube(elbow + np.outer(along, shoulder - elbow), radii, np.array([across, np.cross(direction, across)]))

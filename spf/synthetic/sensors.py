@@ -23,7 +23,6 @@ __all__ = ["SENSORS", "Sensor", "measure", "noise_sd"]
 Image = NDArray[np.float32]
 
 _EDGE_STEP = 0.02  # m of depth between neighbours that makes an edge
-_GRAINY_PART = 0.4  # of the variance
 _STEEP_LOST = 0.7  # of the pixels on surfaces that are too steep
 
 
@@ -39,6 +38,7 @@ class Sensor(NamedTuple):
         distance: m, where a hand is usually held.
         noise_floor: m, and ``noise_quadratic``: 1/m: the two terms of σ(z).
         grain: pixels over which a part of the noise is correlated; 1 for none.
+        grainy: that part, a fraction of the variance.
         ragged: pixels, standard deviation by which edges are displaced.
         flying: probability that an edge pixel reads somewhere between the two surfaces.
         baseline: m between the two eyes of a stereo or structured-light sensor, 0 for none: it shadows and has …
@@ -58,6 +58,7 @@ class Sensor(NamedTuple):
     noise_floor: float = 0.0
     noise_quadratic: float = 0.0
     grain: int = 1
+    grainy: float = 0.0
     ragged: float = 0.0
     flying: float = 0.0
     baseline: float = 0.0
@@ -90,6 +91,7 @@ SENSORS: dict[str, Sensor] = {
         noise_floor=0.0010,
         noise_quadratic=0.0012,
         grain=3,
+        grainy=0.9,
         ragged=0.5,
         flying=0.5,
         steepest=6.0,
@@ -105,7 +107,8 @@ SENSORS: dict[str, Sensor] = {
         distance=0.38,
         noise_floor=0.0015,
         noise_quadratic=0.018,
-        grain=3,
+        grain=7,
+        grainy=0.85,
         ragged=0.8,
         flying=0.3,
         steepest=4.0,
@@ -122,6 +125,7 @@ SENSORS: dict[str, Sensor] = {
         noise_floor=0.0002,
         noise_quadratic=0.0045,
         grain=7,
+        grainy=0.8,
         ragged=1.2,
         baseline=0.055,
         disparity_step=0.03125,
@@ -138,6 +142,7 @@ SENSORS: dict[str, Sensor] = {
         distance=0.5,
         noise_floor=0.0008,
         grain=5,
+        grainy=0.7,
         ragged=1.5,
         steepest=2.5,
         holes=0.04,
@@ -189,7 +194,7 @@ def _measured(sensor: Sensor, clean: Image, rng: np.random.Generator) -> Image:
     if sensor.baseline > 0.0:
         z = _shadowed(sensor, z)
     if sensor.noise_floor > 0.0 or sensor.noise_quadratic > 0.0:
-        z += (z > 0.0) * noise_sd(sensor, z) * _noise(z.shape, sensor.grain, rng)
+        z += (z > 0.0) * noise_sd(sensor, z) * _noise(z.shape, sensor, rng)
     if sensor.disparity_step > 0.0:
         z = _stepped(sensor, z)
     if sensor.steepest > 0.0:
@@ -255,13 +260,14 @@ def _stepped(sensor: Sensor, z: Image) -> Image:
     return np.where(z > 0.0, reach / steps, z).astype(np.float32)
 
 
-def _noise(shape: tuple[int, ...], grain: int, rng: np.random.Generator) -> Image:
-    """Unit normal noise, of which a part is correlated over ``grain`` pixels."""
+def _noise(shape: tuple[int, ...], sensor: Sensor, rng: np.random.Generator) -> Image:
+    """Unit normal noise, of which a part is correlated over the sensor's grain."""
     white = rng.standard_normal(shape, dtype=np.float32)
-    if grain <= 1:
+    if sensor.grain <= 1:
         return white
+    grain = sensor.grain
     grainy = np.float32(grain) * cv2.blur(rng.standard_normal(shape, dtype=np.float32), (grain, grain))
-    return np.float32(np.sqrt(1.0 - _GRAINY_PART)) * white + np.float32(np.sqrt(_GRAINY_PART)) * grainy
+    return np.float32(np.sqrt(1.0 - sensor.grainy)) * white + np.float32(np.sqrt(sensor.grainy)) * grainy
 
 
 def _holed(z: Image, fraction: float, rng: np.random.Generator) -> Image:

@@ -64,7 +64,7 @@ def tube(centres: NDArray[np.float64], radii: NDArray[np.float64], across: NDArr
     Args:
         centres: (K, 3) of the rings, m.
         radii: (K, 2) along the two directions of ``across``, m.
-        across: (2, 3) unit directions of the ellipses' axes; their cross product points along the tube.
+        across: (2, 3) or (K, 2, 3) unit directions of the ellipses' axes; their cross product points along the tube.
     """
     angles = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
     circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
