@@ -1,1 +1,1 @@
-"""."""
+"""The Panel dashboard, served by `panel serve app`."""

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = ["JOINT_NAMES", "Camera", "Frame", "Truth"]
 
 #: The 21 joints that poses, truths and tracks are written in.
-JOINT_NAMES: tuple[str, ...] = ("wrist",) + tuple(
-    f"{finger}_{joint}"
-    for finger, joints in (
-        ("thumb", ("tm", "mp", "ip", "tip")),
-        *((name, ("mcp", "pip", "dip", "tip")) for name in ("index", "middle", "ring", "little")),
-    )
-    for joint in joints
+JOINT_NAMES: tuple[str, ...] = (
+    "wrist",
+    *(f"thumb_{joint}" for joint in ("tm", "mp", "ip", "tip")),
+    *(
+        f"{finger}_{joint}"
+        for finger in ("index", "middle", "ring", "little")
+        for joint in ("mcp", "pip", "dip", "tip")
+    ),
 )
 
 
@@ -90,7 +91,8 @@ class Truth(NamedTuple):
     """Ground truth of a frame.
 
     Attributes:
-        joints: (21, 3) in metres, camera frame, ordered as :data:`JOINT_NAMES`; NaN where the data set has no such joint.
+        joints: (21, 3) in metres, camera frame, ordered as :data:`JOINT_NAMES`; NaN where the data set has no such
+            joint.
         pose: (D,) exact pose of the project's own hand model (synthetic sessions), or None.
         orientation: (3, 3) exact reference orientation that ``pose`` is relative to, or None.
     """
@@ -112,7 +114,7 @@ class Frame(NamedTuple):
         truth: ground truth, or None.
     """
 
-    index: int
+    index: int  # type: ignore[assignment]  # hides tuple.index, which nobody needs here
     time: float
     depth: NDArray[np.float32]
     camera: Camera

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import numbers
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
 
@@ -77,7 +78,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         for info in self.describe():
-            _validate(info, getattr(self, info.name))
+            value = getattr(self, info.name)
+            _validate(info, value)
+            # One type per setting (4, not 4.0 or numpy's 4), so that a manifest reads back as it was written.
+            object.__setattr__(self, info.name, info.kind(value))
 
     @classmethod
     def describe(cls) -> tuple[SettingInfo, ...]:
@@ -146,12 +150,18 @@ def _validate(info: SettingInfo, value: Any) -> None:
         if info.choices and value not in info.choices:
             raise SettingError(f"Setting '{info.name}' is one of {', '.join(info.choices)}, not '{value}'.")
         return
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    is_number = isinstance(value, numbers.Real) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value) or (info.kind is int and value != int(value)):
         kind = "a whole number" if info.kind is int else "a finite number"
         raise SettingError(f"Setting '{info.name}' takes {kind}, not {value!r}.")
     if (info.low is not None and value < info.low) or (info.high is not None and value > info.high):
-        unit = f" {info.unit}" if info.unit else ""
-        raise SettingError(
-            f"Setting '{info.name}' ({info.meaning}) is {value:g}, outside its range {info.low:g} to {info.high:g}{unit}."
-        )
+        raise SettingError(f"Setting '{info.name}' ({info.meaning}) is {value:g}, {_range_sentence(info)}.")
+
+
+def _range_sentence(info: SettingInfo) -> str:
+    unit = f" {info.unit}" if info.unit else ""
+    if info.high is None:
+        return f"and has to be at least {info.low:g}{unit}"
+    if info.low is None:
+        return f"and has to be at most {info.high:g}{unit}"
+    return f"outside its range {info.low:g} to {info.high:g}{unit}"

@@ -1,1 +1,1 @@
-"""."""
+"""Filters: particle sets, resampling, dynamics, kernel density estimation, and the Smart Particle Filter."""

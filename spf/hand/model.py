@@ -122,6 +122,24 @@ class Hand(NamedTuple):
         tip = bind[:, :3] @ self.joint_offset[_MIDDLE_TIP] + bind[:, 3]
         return float(np.linalg.norm(tip - self.skeleton.bind[0, :, 3]))
 
+    def scaled(self, factor: float) -> Hand:
+        """Return the hand enlarged by a factor."""
+
+        def enlarge(transforms: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.ascontiguousarray(transforms * np.array([1.0, 1.0, 1.0, factor]))
+
+        skeleton = self.skeleton._replace(
+            bind=enlarge(self.skeleton.bind),
+            inverse_bind=enlarge(self.skeleton.inverse_bind),
+            rest=enlarge(self.skeleton.rest),
+        )
+        return self._replace(
+            skeleton=skeleton,
+            skin=self.skin._replace(vertices=self.skin.vertices * factor),
+            proxy=self.proxy._replace(vertices=self.proxy.vertices * factor),
+            joint_offset=self.joint_offset * factor,
+        )
+
     def neutral_pose(self) -> NDArray[np.float64]:
         """Return the bind pose at the origin: zeros, (D,)."""
         return np.zeros(self.dofs)

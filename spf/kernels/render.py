@@ -11,7 +11,18 @@ import math
 import numpy as np
 from numba import njit
 
-__all__ = ["FAR", "compare_depth", "project_skin", "project_vertices", "rasterise", "visible_vertices"]
+from spf.kernels.kinematics import pose_bones, skinning_matrices
+
+__all__ = [
+    "FAR",
+    "beyond_wrist",
+    "compare_depth",
+    "golden_energies",
+    "project_skin",
+    "project_vertices",
+    "rasterise",
+    "visible_vertices",
+]
 
 FAR = np.float32(1e9)  # depth of a pixel that nothing covers
 
@@ -122,32 +133,89 @@ def visible_vertices(points, normals, projected, depth, tolerance, perspective, 
     return count
 
 
+@njit(cache=True, nogil=True, fastmath=True, inline="always")
+def beyond_wrist(dx, dy, dz, ax, ay, az):
+    """Whether a point at (dx, dy, dz) from the wrist is forearm: 1 cm past the wrist's plane, in a wide cone around the arm.
+
+    (ax, ay, az) is the palm's axis towards the arm. The cone leaves room for a bent wrist.
+    """
+    along = dx * ax + dy * ay + dz * az
+    if along < 0.01:
+        return False
+    across = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
+    return across < 0.045 + 1.2 * along
+
+
 @njit(cache=True, nogil=True, fastmath=True)
-def compare_depth(rendered, observed, labels, outside, hand_pixels, truncation):
-    """Golden energy: how differently a rendered depth map explains an observed one.
+def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, truncation):
+    """Golden energy: how differently a rendered depth map explains an observed one, 0 (same) to 1.
 
     Over the overlap ``min(d², T²)/T²``; 1 for every hand pixel that the model leaves uncovered; ``outside`` (0-1) for every
-    pixel that the model covers beside the hand; divided by the number of hand pixels. Pixels labelled UNKNOWN count
-    nothing.
+    pixel that the model covers beside the hand; divided by the number of pixels of the union. Pixels labelled UNKNOWN
+    and uncovered pixels of the forearm count nothing.
 
     Args:
         rendered, observed: (H, W) float32 depths, m.
         labels: (H, W) uint8 EMPTY, HAND or UNKNOWN.
         outside: (H, W) float32 cost of covering a pixel beside the hand.
-        hand_pixels: number of HAND pixels.
+        camera: (5,) of the depth maps.
+        wrist, axis: (3,) the wrist, m, and the palm's axis towards the arm.
         truncation: T, m.
+
+    Returns:
+        (golden energy, intersection over union of the silhouettes).
     """
-    total = np.float32(0.0)
-    inverse = np.float32(1.0 / (truncation * truncation))
-    far = np.float32(1e8)
-    one = np.float32(1.0)
-    flat_rendered, flat_observed = rendered.reshape(-1), observed.reshape(-1)
-    flat_labels, flat_outside = labels.reshape(-1), outside.reshape(-1)
-    for i in range(flat_rendered.shape[0]):
-        z = flat_rendered[i]
-        if flat_labels[i] == 1:
-            d = z - flat_observed[i]
-            total += min(d * d * inverse, one)
-        elif z < far:
-            total += flat_outside[i]
-    return total / max(hand_pixels, 1)
+    fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
+    ax, ay, az = axis[0], axis[1], axis[2]
+    inverse = 1.0 / (truncation * truncation)
+    total, union, both = 0.0, 0, 0
+    for v in range(rendered.shape[0]):
+        for u in range(rendered.shape[1]):
+            z, label = rendered[v, u], labels[v, u]
+            if label == HAND:
+                seen = observed[v, u]
+                if z < 1e8:
+                    d = z - seen
+                    total += min(d * d * inverse, 1.0)
+                    both += 1
+                    union += 1
+                else:
+                    reach = seen if perspective else 1.0
+                    dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], seen - wrist[2]
+                    if not beyond_wrist(dx, dy, dz, ax, ay, az):
+                        total += 1.0
+                        union += 1
+            elif label == EMPTY and z < 1e8:
+                total += outside[v, u]
+                union += 1
+    return total / max(union, 1), both / max(union, 1)
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def golden_energies(skeleton, proxy, faces, obs, poses, scales, reference, truncation, energies, overlaps):
+    """Golden energy and silhouette overlap of many poses (N, D) of the hand enlarged by scales (N,), into (N,) arrays.
+
+    The part of the model that falls outside the grid adds its share of the vertices.
+    """
+    bones = skeleton.parent.shape[0]
+    frames, matrices = np.empty((bones, 3, 4)), np.empty((bones, 3, 4))
+    axes = np.empty((3 + skeleton.revolute_bone.shape[0], 3))
+    projected = np.empty((proxy.vertices.shape[0], 3), np.float32)
+    height, width = obs.grid_depth.shape
+    depth = np.empty((height, width), np.float32)
+    for n in range(poses.shape[0]):
+        pose_bones(skeleton, poses[n], reference, frames, axes)
+        skinning_matrices(skeleton, frames, matrices)
+        matrices *= scales[n]
+        project_skin(proxy, matrices, poses[n, :3], obs.grid_camera, projected)
+        rasterise(projected, faces, depth)
+        lost = 0
+        for i in range(projected.shape[0]):
+            if not (0.0 <= projected[i, 0] < width and 0.0 <= projected[i, 1] < height):
+                lost += 1
+        golden, overlap = compare_depth(
+            depth, obs.grid_depth, obs.grid_labels, obs.grid_outside, obs.grid_camera,
+            scales[n] * frames[0, :, 3] + poses[n, :3], frames[0, :, 2], truncation,
+        )  # fmt: skip
+        energies[n] = golden + lost / projected.shape[0]
+        overlaps[n] = overlap

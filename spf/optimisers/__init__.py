@@ -1,1 +1,1 @@
-"""."""
+"""Optimisers of the cost, one a file."""

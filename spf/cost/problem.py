@@ -1,0 +1,99 @@
+"""A cost to minimise: one hand, one observation, the weights of the terms, and a sample of pixels shared by all particles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.cost.settings import CostSettings
+from spf.cost.spheres import digit_spheres
+from spf.hand.model import Hand
+from spf.kernels.cost import CostWeights, Spheres
+from spf.kernels.render import golden_energies
+from spf.kernels.smd import SmdParameters, evaluate_poses
+from spf.observation import Observation
+
+__all__ = ["Problem", "costs", "golden", "make_problem"]
+
+Array = NDArray[np.float64]
+GOLDEN_TRUNCATION = 0.04  # T, m
+_POOL = 90  # observed pixels that are matched anew each round
+_MATCH_RADIUS = 0.06  # m
+
+
+class Problem(NamedTuple):
+    """The cost of one frame.
+
+    Attributes:
+        hand, spheres, observation, settings, weights: what is compared, and how.
+        reference: (3, 3) R_ref of all poses.
+        data_pool: (n,) int32 observed pixels, the same for all particles of the frame.
+        curvature_floor: (D,) least curvature per entry that a₀ is computed with.
+        match_radius: m.
+    """
+
+    hand: Hand
+    spheres: Spheres
+    observation: Observation
+    settings: CostSettings
+    weights: CostWeights
+    reference: Array
+    data_pool: NDArray[np.int32]
+    curvature_floor: Array
+    match_radius: float
+
+
+def make_problem(
+    hand: Hand,
+    observation: Observation,
+    settings: CostSettings,
+    reference: Array,
+    rng: np.random.Generator,
+    spheres: Spheres | None = None,
+) -> Problem:
+    """Set up the cost of a frame; draws the pool of observed pixels."""
+    pixels = observation.arrays.pixels
+    chosen = rng.choice(len(pixels), size=min(_POOL, len(pixels)), replace=False) if len(pixels) else []
+    floor = np.array([10.0 * settings.points] * 3 + [0.01 * settings.points] * (hand.dofs - 3))
+    return Problem(
+        hand,
+        digit_spheres(hand) if spheres is None else spheres,
+        observation,
+        settings,
+        settings.weights(),
+        np.ascontiguousarray(reference),
+        pixels[chosen],
+        floor,
+        _MATCH_RADIUS,
+    )
+
+
+def costs(problem: Problem, poses: Array) -> Array:
+    """E (3) of poses (N, D) on all the model points that the camera sees and the frame's pool of pixels, (N,)."""
+    hand, energies = problem.hand, np.empty(len(poses))
+    parameters = SmdParameters(
+        0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, 0, False, 0.0, problem.match_radius, bool(problem.settings.zbuffer)
+    )
+    evaluate_poses(
+        hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, problem.spheres, problem.observation.arrays,
+        problem.weights, parameters, np.ascontiguousarray(poses), problem.reference, problem.data_pool, energies,
+    )  # fmt: skip
+    return energies
+
+
+def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple[Array, Array]:
+    """Compare renders of poses (N, D) with the observed depth: golden energy (N,), silhouette overlap (N,).
+
+    Each pose may have its own scale (N,) of the hand.
+    """
+    if scales is None:
+        scales = np.ones(len(poses))
+    hand = problem.hand
+    energies, overlaps = np.empty(len(poses)), np.empty(len(poses))
+    golden_energies(
+        hand.skeleton, hand.proxy, hand.proxy_faces, problem.observation.arrays, np.ascontiguousarray(poses),
+        np.ascontiguousarray(scales), problem.reference, GOLDEN_TRUNCATION, energies, overlaps,
+    )  # fmt: skip
+    return energies, overlaps
