@@ -38,7 +38,8 @@ def digit_spheres(hand: Hand) -> Spheres:
         (a, b)
         for a in range(len(bones))
         for b in range(a + 1, len(bones))
-        if (digits[b] - digits[a] == 1 and digits[a] > 0) or (digits[a] == 0 and digits[b] in (1, 2, 3) and bones[a] > 1)
+        if (digits[b] - digits[a] == 1 and digits[a] > 0)
+        or (digits[a] == 0 and digits[b] in (1, 2, 3) and bones[a] > 1)
     ]
     return Spheres(
         np.array(bones, np.int32), np.array(centres), np.array(radii), np.array(pairs, np.int32).reshape(-1, 2)

@@ -11,7 +11,7 @@ from spf.errors import HandError
 from spf.hand.model import Hand
 from spf.kernels import kinematics as kernels
 
-__all__ = ["PosedHand", "joints_of", "pose_hand", "rotation_about", "skin_jvp", "skin_vjp"]
+__all__ = ["PosedHand", "angles_of", "joints_of", "pose_hand", "rotation_about", "skin_jvp", "skin_vjp"]
 
 Array = NDArray[np.float64]
 
@@ -94,6 +94,14 @@ def rotation_about(angles: ArrayLike) -> Array:
     ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
     rz = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
     return rx @ ry @ rz
+
+
+def angles_of(rotation: Array) -> Array:
+    """Return the three palm angles (a, b, c) with Rx(a) Ry(b) Rz(c) = rotation (3, 3), the inverse of :func:`rotation_about`."""
+    b = np.arcsin(min(max(rotation[0, 2], -1.0), 1.0))
+    a = np.arctan2(-rotation[1, 2], rotation[2, 2])
+    c = np.arctan2(-rotation[0, 1], rotation[0, 0])
+    return np.array([a, b, c])
 
 
 def skin_jvp(

@@ -28,6 +28,8 @@ FAR = np.float32(1e9)  # depth of a pixel that nothing covers
 
 #: Labels of the pixels of an observation.
 EMPTY, HAND, UNKNOWN = 0, 1, 2
+FOREARM_RADIUS = 0.05  # m, of an adult's arm with its sleeve
+FOREARM_COST = 0.1
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -147,12 +149,35 @@ def beyond_wrist(dx, dy, dz, ax, ay, az):
 
 
 @njit(cache=True, nogil=True, fastmath=True)
-def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, truncation):
+def _forearm_axis(rendered, observed, labels, camera, wrist, axis, direction):
+    """Direction (3,) from the wrist to the middle of the uncovered hand pixels beyond it; returns their number."""
+    fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
+    count, sx, sy, sz = 0, 0.0, 0.0, 0.0
+    for v in range(rendered.shape[0]):
+        for u in range(rendered.shape[1]):
+            if labels[v, u] == HAND and rendered[v, u] > 1e8:
+                z = observed[v, u]
+                reach = z if perspective else 1.0
+                dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], z - wrist[2]
+                if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2]):
+                    count += 1
+                    sx += dx
+                    sy += dy
+                    sz += dz
+    length = math.sqrt(sx * sx + sy * sy + sz * sz)
+    if length > 0.0:
+        direction[0], direction[1], direction[2] = sx / length, sy / length, sz / length
+    return count
+
+
+@njit(cache=True, nogil=True, fastmath=True)
+def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scale, truncation):
     """Golden energy: how differently a rendered depth map explains an observed one, 0 (same) to 1.
 
     Over the overlap ``min(d², T²)/T²``; 1 for every hand pixel that the model leaves uncovered; ``outside`` (0-1) for every
     pixel that the model covers beside the hand; divided by the number of pixels of the union. Pixels labelled UNKNOWN
-    and uncovered pixels of the forearm count nothing.
+    count nothing. Uncovered pixels beyond the wrist that lie in one tube as wide as an arm are the forearm and count
+    FOREARM_COST each: a spread hand is no forearm.
 
     Args:
         rendered, observed: (H, W) float32 depths, m.
@@ -160,14 +185,17 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, trun
         outside: (H, W) float32 cost of covering a pixel beside the hand.
         camera: (5,) of the depth maps.
         wrist, axis: (3,) the wrist, m, and the palm's axis towards the arm.
+        scale: of the hand, for the width of the arm.
         truncation: T, m.
 
     Returns:
         (golden energy, intersection over union of the silhouettes).
     """
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
-    ax, ay, az = axis[0], axis[1], axis[2]
+    arm = np.zeros(3)
+    forearm = _forearm_axis(rendered, observed, labels, camera, wrist, axis, arm)
     inverse = 1.0 / (truncation * truncation)
+    tube = (FOREARM_RADIUS * scale) ** 2
     total, union, both = 0.0, 0, 0
     for v in range(rendered.shape[0]):
         for u in range(rendered.shape[1]):
@@ -180,11 +208,16 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, trun
                     both += 1
                     union += 1
                 else:
-                    reach = seen if perspective else 1.0
-                    dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], seen - wrist[2]
-                    if not beyond_wrist(dx, dy, dz, ax, ay, az):
-                        total += 1.0
-                        union += 1
+                    if forearm > 0:
+                        reach = seen if perspective else 1.0
+                        dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], seen - wrist[2]
+                        if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2]):
+                            along = dx * arm[0] + dy * arm[1] + dz * arm[2]
+                            if dx * dx + dy * dy + dz * dz - along * along < tube:
+                                total += FOREARM_COST
+                                continue
+                    total += 1.0
+                    union += 1
             elif label == EMPTY and z < 1e8:
                 total += outside[v, u]
                 union += 1
@@ -215,7 +248,7 @@ def golden_energies(skeleton, proxy, faces, obs, poses, scales, reference, trunc
                 lost += 1
         golden, overlap = compare_depth(
             depth, obs.grid_depth, obs.grid_labels, obs.grid_outside, obs.grid_camera,
-            scales[n] * frames[0, :, 3] + poses[n, :3], frames[0, :, 2], truncation,
+            scales[n] * frames[0, :, 3] + poses[n, :3], frames[0, :, 2], scales[n], truncation,
         )  # fmt: skip
         energies[n] = golden + lost / projected.shape[0]
         overlaps[n] = overlap

@@ -160,7 +160,7 @@ def _warnings(missing: int, sequences: list[str]) -> tuple[str, ...]:
         warnings.append(f"{missing} labelled images are not in the folder and were left out.")
     if len(sequences) > 1:
         warnings.append(
-            f"{len(sequences)} sequences follow one another and the hand jumps between them: to track one, open its folder"
-            f" ({', '.join(sequences[:3])}{', …' if len(sequences) > 3 else ''})."
+            f"{len(sequences)} sequences follow one another and the hand jumps between them: to track one, open its "
+            f"folder ({', '.join(sequences[:3])}{', …' if len(sequences) > 3 else ''})."
         )
     return tuple(warnings)

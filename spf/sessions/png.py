@@ -56,7 +56,10 @@ def read_depth_png(path: Path) -> NDArray[np.uint16]:
     Raises:
         SessionError: the file is missing, empty, torn, or no 16-bit grey PNG.
     """
-    return _decode(path, bits=16, kind=_GREY, wanted="a 16-bit grey PNG: store depth as uint16 counts")
+    raw: NDArray[np.uint16] = _decode(
+        path, bits=16, kind=_GREY, wanted="a 16-bit grey PNG: store depth as uint16 counts"
+    )
+    return raw
 
 
 def read_packed_depth_png(path: Path) -> NDArray[np.uint16]:
@@ -70,7 +73,8 @@ def read_packed_depth_png(path: Path) -> NDArray[np.uint16]:
     """
     image = _decode(path, bits=8, kind=_RGB, wanted="an 8-bit colour PNG with depth in green and blue")
     blue, green = image[..., 0].astype(np.uint16), image[..., 1].astype(np.uint16)
-    return (green << 8) | blue
+    packed: NDArray[np.uint16] = np.bitwise_or(np.left_shift(green, 8), blue)
+    return packed
 
 
 def read_colour_png(path: Path) -> NDArray[np.uint8]:

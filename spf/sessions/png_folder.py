@@ -40,16 +40,17 @@ def open_png_folder(path: Path, camera: Camera | Path | None = None) -> Session:
     check_png_sizes(paths)
     header = png_header(paths[0])
     given = _camera(path, camera)
-    if (given.width or header.width, given.height or header.height) != (header.width, header.height):
+    width, height = given.width or header.width, given.height or header.height
+    if (width, height) != (header.width, header.height):
         raise SessionError(
-            f"The images in {path} are {header.width}×{header.height}, but the camera given is "
-            f"{given.width}×{given.height}: give the width, height and focal lengths of the images."
+            f"The images in {path} are {header.width}×{header.height}, but the camera given is {width}×{height}: "
+            "give the width, height and focal lengths of the images."
         )
     session = FileSession(
         uri=str(path),
         name=path.resolve().name,
         format="png-folder",
-        camera=given.camera(header.width, header.height),
+        camera=given.camera(width, height),
         times_ns=steady_times(range(len(paths)), given.fps),
         depth_unit=given.depth_unit,
         side=given.side,

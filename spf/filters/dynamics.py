@@ -1,0 +1,55 @@
+"""First-order dynamics (Fig. 6b): p ← p + ṗ·Δt + noise."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.hand.model import Hand
+from spf.settings import Settings, setting
+
+__all__ = ["DynamicsSettings", "noise_scale", "predict"]
+
+Array = NDArray[np.float64]
+_DYNAMICS = "Dynamics"
+_FRAME = 1.0 / 30.0  # s: the noise below is that of a frame at 30 frames/s
+
+
+@dataclasses.dataclass(frozen=True)
+class DynamicsSettings(Settings):
+    """How particles spread between frames."""
+
+    noise_translation: float = setting(
+        0.005, "noise of the palm's place per frame", group=_DYNAMICS, low=1e-5, high=0.2, unit="m"
+    )
+    noise_rotation: float = setting(
+        0.06, "noise of the palm's rotation per frame", group=_DYNAMICS, low=1e-4, high=2.0, unit="rad"
+    )
+    noise_digits: float = setting(
+        0.12, "noise of the digits' angles per frame", group=_DYNAMICS, low=1e-4, high=2.0, unit="rad"
+    )
+    velocity: float = setting(
+        0.5,
+        "share of the last velocity that is kept; 1 is the paper's first-order model",
+        group=_DYNAMICS,
+        low=0.0,
+        high=1.0,
+    )
+
+
+def noise_scale(hand: Hand, settings: DynamicsSettings, interval: float = _FRAME) -> Array:
+    """Standard deviation (D,) of the process noise over an interval, m and rad; it grows with the root of time."""
+    scale = np.full(hand.dofs, settings.noise_digits)
+    scale[:3], scale[3:6] = settings.noise_translation, settings.noise_rotation
+    scale[[name.endswith("twist") for name in hand.dof_names]] = settings.noise_digits / 6.0
+    return np.asarray(scale * np.sqrt(max(interval, 1e-3) / _FRAME))
+
+
+def predict(
+    hand: Hand, poses: Array, velocities: Array, interval: float, settings: DynamicsSettings, rng: np.random.Generator
+) -> Array:
+    """Move particles (N, D) by their velocity and by noise, within the joint limits."""
+    noise = rng.normal(size=poses.shape) * noise_scale(hand, settings, interval)
+    return hand.constrain(poses + settings.velocity * velocities * interval + noise)
