@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Keys = Iterator["Key"]
 
 _ARTICULATED = slice(6, 26)
-_UNHURRIED = (0.0, 0.0, 0.0)
+_STILL = (0.0, 0.0, 0.0)
 
 
 class Key(NamedTuple):
@@ -38,8 +38,8 @@ class Key(NamedTuple):
     """
 
     articulation: Array
-    turn: tuple[float, float, float] = _UNHURRIED
-    shift: tuple[float, float, float] = _UNHURRIED
+    turn: tuple[float, float, float] = _STILL
+    shift: tuple[float, float, float] = _STILL
     seconds: float = 0.6
     dwell: float = 0.08
     thumb_delay: float = 0.0

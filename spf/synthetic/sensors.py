@@ -134,7 +134,7 @@ SENSORS: dict[str, Sensor] = {
     ),
     "structured_light": Sensor(
         meaning="the paper's Fig. 2: orthographic, holes, a phalanx missing, a finger pushed into the scene",
-        camera=Camera(384, 288, 1100.0, 1100.0, 191.5, 143.5, "orthographic"),
+        camera=Camera(480, 360, 1200.0, 1200.0, 239.5, 179.5, "orthographic"),
         fps=12.5,
         depth_unit=0.0001,
         near=0.1,
