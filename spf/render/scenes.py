@@ -1,0 +1,134 @@
+"""The three pictures of the dashboard and the reports, as scenes: particles, trajectories, reconstruction.
+
+They take plain arrays in the camera frame and in metres, so that any tracker's result can be drawn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spf.render.palette import FAINT, HAND, OBSERVED, OPTIMISED, PREDICTED, RESIDUAL, gradient
+from spf.render.scene import Lines, Mesh, Points, Scene
+
+__all__ = ["particles_scene", "reconstruction_scene", "trajectories_scene"]
+
+#: Opacity of a hand without weight, and of the heaviest.
+OPACITY_RANGE = (0.25, 0.9)
+
+#: Distance from the model, in metres, at which an observed point has the full colour of a residual.
+RESIDUAL_FULL = 0.010
+
+
+def particles_scene(
+    predicted: ArrayLike | None,
+    optimised: ArrayLike,
+    faces: ArrayLike,
+    *,
+    predicted_weights: ArrayLike | None = None,
+    optimised_weights: ArrayLike | None = None,
+    points: ArrayLike | None = None,
+    at_most: int = 8,
+) -> Scene:
+    """Show the particles before and after optimisation, the heavier the more solid (Fig. 6, c and e).
+
+    Args:
+        predicted: (N, V, 3) vertices of the predicted hands in metres, or None where the tracker has none.
+        optimised: (N, V, 3) vertices of the optimised hands, particle for particle.
+        faces: (F, 3) vertex indices, counter-clockwise seen from outside.
+        predicted_weights, optimised_weights: (N,) weights of the two halves, on one scale; None draws all alike.
+        points: (M, 3) observed points, or None.
+        at_most: draw only the particles whose heavier half is among the heaviest so many.
+
+    Raises:
+        ValueError: shapes do not fit together, or a weight is negative or not finite.
+    """
+    after = np.asarray(optimised, dtype=np.float32)
+    before = np.zeros((0, *after.shape[1:]), np.float32) if predicted is None else np.asarray(predicted, np.float32)
+    if len(before) not in (0, len(after)):
+        raise ValueError(f"there are {len(before)} predicted and {len(after)} optimised hands")
+    weights_before = _weights(predicted_weights, len(before))
+    weights_after = _weights(optimised_weights, len(after))
+    heaviest = max(weights_before.max(initial=0.0), weights_after.max(initial=0.0)) or 1.0
+    rank = weights_after if not len(before) else np.maximum(weights_before, weights_after)
+    drawn = np.sort(np.argsort(-rank, kind="stable")[:at_most])
+    indices = np.asarray(faces, dtype=np.int32)
+    low, high = OPACITY_RANGE
+    hands = tuple(
+        Mesh(half[n], indices, colour, low + (high - low) * float(weights[n] / heaviest))
+        for half, weights, colour in ((before, weights_before, PREDICTED), (after, weights_after, OPTIMISED))
+        for n in drawn
+        if len(half)
+    )
+    return Scene(meshes=hands, points=_backdrop(points))
+
+
+def trajectories_scene(paths: ArrayLike, *, weights: ArrayLike | None = None, points: ArrayLike | None = None) -> Scene:
+    """Show how Stochastic Meta-Descent moved some joints of every particle, from a start dot to an end dot (Fig. 10).
+
+    Args:
+        paths: (N, I, J, 3) of N particles, I ≥ 1 iterations and J joints (the wrist and the five fingertips), metres; a
+            particle that converged early repeats its last position.
+        weights: (N,) weights after optimisation: lighter particles fade into the background; None draws all alike.
+        points: (M, 3) observed points, or None.
+
+    Raises:
+        ValueError: shapes do not fit together, or a number is negative (weights) or not finite.
+    """
+    steps = np.asarray(paths, dtype=np.float32)
+    if steps.ndim != 4 or steps.shape[1] < 1 or steps.shape[3] != 3:
+        raise ValueError(f"paths have shape {steps.shape}, expected (N, I, J, 3) with at least one iteration")
+    particles, iterations, joints, _ = steps.shape
+    given = _weights(weights, particles)
+    strength = 0.35 + 0.65 * np.repeat(given / (given.max(initial=0.0) or 1.0), joints)[:, None, None]
+    along = gradient(PREDICTED, OPTIMISED, np.linspace(0.0, 1.0, iterations))
+    colours = np.asarray(FAINT) * (1 - strength) + along * strength
+    lines = steps.transpose(0, 2, 1, 3).reshape(particles * joints, iterations, 3)
+    return Scene(
+        points=(
+            *_backdrop(points),
+            Points(lines[:, 0], colours[:, 0], size=5.0, ball=True),
+            Points(lines[:, -1], colours[:, -1], size=9.0, ball=True),
+        ),
+        lines=(Lines(lines, colours, width=2.0),),
+    )
+
+
+def reconstruction_scene(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    points: ArrayLike | None = None,
+    residuals: ArrayLike | None = None,
+) -> Scene:
+    """Show the reconstructed hand among the observed points (Fig. 9).
+
+    Args:
+        vertices: (V, 3) of the posed mesh, metres.
+        faces: (F, 3) vertex indices, counter-clockwise seen from outside.
+        points: (M, 3) observed points, or None.
+        residuals: (M,) distance of each point from the model, metres: the farther, the redder; None draws all alike.
+
+    Raises:
+        ValueError: shapes do not fit together or a number is not finite.
+    """
+    hand = Mesh(np.asarray(vertices), np.asarray(faces), HAND)
+    if points is None:
+        return Scene(meshes=(hand,))
+    colours = np.asarray(OBSERVED)
+    if residuals is not None:
+        colours = gradient(OBSERVED, RESIDUAL, np.asarray(residuals, dtype=np.float64) / RESIDUAL_FULL)
+    return Scene(meshes=(hand,), points=(Points(np.asarray(points), colours, size=2.0),))
+
+
+def _backdrop(points: ArrayLike | None) -> tuple[Points, ...]:
+    return () if points is None else (Points(np.asarray(points), FAINT, size=2.0),)
+
+
+def _weights(weights: ArrayLike | None, count: int) -> NDArray[np.float64]:
+    values = np.ones(count) if weights is None else np.asarray(weights, dtype=np.float64)
+    if values.shape != (count,):
+        raise ValueError(f"weights have shape {values.shape}, expected ({count},)")
+    if not np.isfinite(values).all() or (values < 0).any():
+        raise ValueError("weights must be finite and not negative")
+    return values
