@@ -73,6 +73,27 @@ def test_actors_are_used_again_for_other_shapes_and_hidden_when_unused(renderer)
     assert_array_equal(renderer.picture(nothing, VIEW, SIZE), empty)
 
 
+def test_a_mesh_with_other_faces_takes_the_place_of_the_one_before(renderer):
+    for rings in (16, 8, 24):
+        picture = renderer.picture(ball(0.02, radius=0.03, rings=rings), VIEW, SIZE)
+        assert_allclose(centre_of(picture), [0.02, 0], atol=METRES_A_PIXEL)
+        assert_allclose(drawn(picture).sum() * METRES_A_PIXEL**2, np.pi * 0.03**2, rtol=0.1)
+
+
+def test_other_numbers_of_paths_steps_and_points_take_the_place_of_those_before(renderer):
+    for count, length in ((3, 2), (1, 9), (4, 3)):
+        x = np.linspace(-0.06, 0.0, count)[:, None] + np.zeros(length)
+        paths = np.stack([x, np.linspace(-0.05, 0.05, length) + 0 * x, 0 * x + 0.5], axis=-1)
+        columns = np.flatnonzero(drawn(renderer.picture(Scene(lines=(Lines(paths, width=4.0),)), VIEW, SIZE))[60])
+        expected = np.linspace(-0.06, 0.0, count) / METRES_A_PIXEL + 79.5
+        assert np.abs(columns[:, None] - expected).min(axis=1).max() < 2  # nothing but lines …
+        assert np.abs(columns[:, None] - expected).min(axis=0).max() < 2  # … and all of them
+    for count in (2, 5, 3):
+        xyz = np.stack([np.linspace(-0.06, 0.06, count), np.zeros(count), np.full(count, 0.5)], axis=-1)
+        picture = renderer.picture(Scene(points=(Points(xyz, size=12.0),)), VIEW, SIZE)
+        assert cv2.connectedComponents(drawn(picture).astype(np.uint8))[0] == 1 + count
+
+
 def test_lines_and_coloured_points_are_drawn_where_and_as_they_are(renderer):
     line = Scene(lines=(Lines([[[-0.08, 0, 0.5], [0.08, 0, 0.5]]], np.array([RED, BLUE]), width=8.0),))
     picture = renderer.picture(line, VIEW, SIZE).astype(int)
