@@ -17,7 +17,7 @@ OPTIMISED: Colour = (0.337, 0.706, 0.914)
 HAND: Colour = (0.460, 0.690, 0.850)
 #: Observed points, and the same when they are only the backdrop.
 OBSERVED: Colour = (0.860, 0.860, 0.840)
-FAINT: Colour = (0.375, 0.400, 0.430)
+FAINT: Colour = (0.460, 0.485, 0.515)
 #: Observed points that the model does not explain.
 RESIDUAL: Colour = (0.890, 0.360, 0.070)
 

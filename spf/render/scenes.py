@@ -16,6 +16,12 @@ __all__ = ["particles_scene", "reconstruction_scene", "trajectories_scene"]
 #: Opacity of a hand without weight, and of the heaviest.
 OPACITY_RANGE = (0.25, 0.9)
 
+#: Observed points beyond this number are thinned out: a closed sheet of them would hide the hand.
+POINTS_AT_MOST = 4000
+
+#: Brightness of the farthest observed point; the nearest has 1. It shows their relief.
+FAR_BRIGHTNESS = 0.55
+
 #: Distance from the model, in metres, at which an observed point has the full colour of a residual.
 RESIDUAL_FULL = 0.010
 
@@ -115,14 +121,36 @@ def reconstruction_scene(
     hand = Mesh(np.asarray(vertices), np.asarray(faces), HAND)
     if points is None:
         return Scene(meshes=(hand,))
-    colours = np.asarray(OBSERVED)
+    xyz = np.asarray(points, dtype=np.float32)
+    colours = np.asarray(OBSERVED) * _relief(xyz)
     if residuals is not None:
-        colours = gradient(OBSERVED, RESIDUAL, np.asarray(residuals, dtype=np.float64) / RESIDUAL_FULL)
-    return Scene(meshes=(hand,), points=(Points(np.asarray(points), colours, size=2.0),))
+        far = np.asarray(residuals, dtype=np.float64)
+        if far.shape != xyz.shape[:1] or not np.isfinite(far).all():
+            raise ValueError(f"residuals have shape {far.shape}, expected ({len(xyz)},), all finite")
+        colours = gradient(OBSERVED, RESIDUAL, far / RESIDUAL_FULL) * _relief(xyz)
+    thin = _thin(len(xyz))
+    return Scene(meshes=(hand,), points=(Points(xyz[thin], colours[thin], size=2.0),))
 
 
 def _backdrop(points: ArrayLike | None) -> tuple[Points, ...]:
-    return () if points is None else (Points(np.asarray(points), FAINT, size=2.0),)
+    if points is None:
+        return ()
+    xyz = np.asarray(points, dtype=np.float32)
+    thin = _thin(len(xyz))
+    return (Points(xyz[thin], (np.asarray(FAINT) * _relief(xyz))[thin], size=2.0),)
+
+
+def _thin(count: int) -> NDArray[np.bool_]:
+    """Return which points to draw: chosen at random, since every k-th of an image's pixels makes stripes."""
+    return np.random.default_rng(0).random(count) * count <= POINTS_AT_MOST
+
+
+def _relief(xyz: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return (M, 1) brightness that falls with the distance from the sensor."""
+    if xyz.ndim != 2 or not len(xyz):
+        return np.ones((1, 1))
+    near, far = np.percentile(xyz[:, 2], [2, 98])
+    return 1 - (1 - FAR_BRIGHTNESS) * np.clip((xyz[:, 2:] - near) / max(far - near, 1e-3), 0, 1)
 
 
 def _weights(weights: ArrayLike | None, count: int) -> NDArray[np.float64]:

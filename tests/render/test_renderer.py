@@ -9,7 +9,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from spf.errors import RenderError
-from spf.render import Lines, Mesh, Points, Scene
+from spf.frame import Camera
+from spf.hand import load_hand
+from spf.hand.kinematics import pose_hand
+from spf.render import Lines, Mesh, Points, Scene, ViewCamera, reconstruction_scene
 from tests.render.conftest import METRES_A_PIXEL, SIZE, VIEW, centre_of, drawn, sphere
 
 RED, BLUE = (1.0, 0.2, 0.1), (0.1, 0.3, 1.0)
@@ -28,6 +31,23 @@ def test_a_sphere_is_round_shaded_and_where_it_should_be(renderer):
     inside = picture[drawn(picture)].astype(float)
     assert (inside[:, 2] >= inside[:, 0]).all()
     assert inside[:, 2].std() > 10
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_posed_hand_covers_the_pixels_that_the_sensor_s_camera_projects_it_to(renderer, side):
+    hand = load_hand(side)
+    vertices = pose_hand(hand, hand.neutral_pose()).vertices
+    vertices = vertices - vertices.mean(axis=0) + [0.0, 0.0, 0.6]
+    view = ViewCamera((0.0, 0.0, 0.6), distance=0.6, extent=0.3)  # on the axis, so that it is a plain pinhole camera
+    width, height = 320, 240
+    focal = height / (view.extent / view.distance)
+    camera = Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
+    picture = renderer.picture(reconstruction_scene(vertices, hand.faces), view, (width, height))
+    columns, rows = (np.flatnonzero(drawn(picture).any(axis=axis)) for axis in (0, 1))
+    projected = camera.project(vertices)
+    assert_allclose([columns[0], rows[0]], projected.min(axis=0), atol=1.5)
+    assert_allclose([columns[-1], rows[-1]], projected.max(axis=0), atol=1.5)
+    assert picture[drawn(picture)].astype(float).std(axis=0).min() > 15  # shaded, not flat
 
 
 def test_y_points_down_and_the_nearer_hides_the_farther(renderer):

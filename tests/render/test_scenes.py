@@ -27,7 +27,7 @@ def test_both_halves_of_the_particles_are_shown_in_their_colours():
         assert_array_equal(mesh.colour, as_bytes(colour))
         assert 0 < mesh.opacity < 1
     assert_allclose(scene.meshes[0].vertices, hands(3, 0.1)[0], atol=1e-6)
-    assert_array_equal(scene.points[0].colour, as_bytes(FAINT))
+    assert (scene.points[0].colour <= as_bytes(FAINT)).all()
 
 
 def test_the_heavier_a_particle_the_more_solid():
@@ -94,12 +94,41 @@ def test_paths_of_another_shape_are_refused(shape):
 
 def test_points_far_from_the_reconstruction_are_red():
     residuals = np.r_[0.0, 0.005, 0.01, np.full(47, 0.5)]
-    scene = reconstruction_scene(BALL.vertices, BALL.faces, points=POINTS, residuals=residuals)
+    flat = POINTS * [1, 1, 0] + [0, 0, 0.5]
+    scene = reconstruction_scene(BALL.vertices, BALL.faces, points=flat, residuals=residuals)
     colours = scene.points[0].colour
     assert_array_equal(colours[0], as_bytes(OBSERVED))
     assert_array_equal(colours[2], as_bytes(RESIDUAL))
     assert_array_equal(colours[3:], np.tile(as_bytes(RESIDUAL), (47, 1)))
     assert scene.meshes[0].opacity == 1
+
+
+@pytest.mark.parametrize("residuals", [np.zeros(3), np.full(50, np.nan)])
+def test_residuals_that_do_not_fit_are_refused(residuals):
+    with pytest.raises(ValueError, match="residuals have shape"):
+        reconstruction_scene(BALL.vertices, BALL.faces, points=POINTS, residuals=residuals)
+
+
+def test_the_farther_from_the_sensor_the_darker_a_point():
+    colours = reconstruction_scene(BALL.vertices, BALL.faces, points=POINTS).points[0].colour.astype(int)
+    assert (np.diff(colours[np.argsort(POINTS[:, 2])], axis=0) <= 0).all()
+    assert colours.max() > 1.5 * colours.min()
+
+
+def test_a_closed_sheet_of_points_is_thinned_out_evenly_with_its_residuals():
+    sheet = np.random.default_rng(0).uniform([-0.1, -0.1, 0.5], [0.1, 0.1, 0.5], (30_000, 3))
+    residuals = np.where(sheet[:, 0] > 0, 1.0, 0.0)
+    cloud = reconstruction_scene(BALL.vertices, BALL.faces, points=sheet, residuals=residuals).points[0]
+    assert 3800 < len(cloud.xyz) < 4200
+    assert_allclose(cloud.xyz.mean(axis=0), [0, 0, 0.5], atol=0.01)
+    assert_array_equal(cloud.colour[cloud.xyz[:, 0] > 0][0], as_bytes(RESIDUAL))
+    assert_array_equal(cloud.colour[cloud.xyz[:, 0] < 0][0], as_bytes(OBSERVED))
+    assert len(trajectories_scene(np.zeros((1, 1, 6, 3)), points=sheet).points[0].xyz) == len(cloud.xyz)
+
+
+def test_no_observed_points_at_all():
+    scene = reconstruction_scene(BALL.vertices, BALL.faces, points=np.zeros((0, 3)))
+    assert len(scene.points[0].xyz) == 0
 
 
 def test_a_reconstruction_without_points():
