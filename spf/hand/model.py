@@ -58,13 +58,14 @@ _MAX_INFLUENCES = 4
 _PROXY_FACES = 560  # triangles of the coarse copy: 1-2 mm off the skin, drawn in 20 µs
 _MIDDLE_TIP = 12
 
-# Degrees, relative to the bind pose: (low, high).
-_THUMB_LIMITS = ((-35.0, 35.0), (-25.0, 45.0), (-20.0, 60.0), (-30.0, 80.0))
-_ABDUCTION_LIMITS = {"index": (-18.0, 22.0), "middle": (-15.0, 15.0), "ring": (-18.0, 15.0), "little": (-25.0, 18.0)}
-_MP_FLEXION_LIMITS = (-20.0, 90.0)
+# Degrees, relative to the bind pose: (low, high). Chosen by looking at the mesh posed at each of them: the widest
+# that a hand reaches (thumb to the little fingertip, thumb over a fist, fingers spread or crossed) with its skin whole.
+_THUMB_LIMITS = ((-40.0, 60.0), (-35.0, 60.0), (-25.0, 70.0), (-35.0, 85.0))
+_ABDUCTION_LIMITS = {"index": (-20.0, 30.0), "middle": (-20.0, 20.0), "ring": (-22.0, 20.0), "little": (-32.0, 22.0)}
+_MP_FLEXION_LIMITS = (-25.0, 95.0)
 _TWIST_LIMITS = (-4.0, 4.0)
-_PIP_LIMITS = (-8.0, 110.0)
-_DIP_LIMITS = (-8.0, 80.0)
+_PIP_LIMITS = (-10.0, 112.0)
+_DIP_LIMITS = (-10.0, 85.0)
 
 _WEBXR_BONE = {"proximal": "phalanx-proximal", "intermediate": "phalanx-intermediate", "distal": "phalanx-distal"}
 
