@@ -172,7 +172,7 @@ def locate(
         distinct = _spaced(hand, found, _POLISHED)
         polished = _polish(problem, cost, found.poses[distinct], found.scales[distinct], rng)
         poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
-        found = refine(problem, poses, scales, settings._replace(generations=6), rng)
+        found = refine(problem, poses, scales, settings, rng)
     return sorted(polished, key=lambda item: item[2])
 
 
@@ -217,7 +217,7 @@ def recover(frame: Frame, hand: Hand, usual: float, rng: np.random.Generator) ->
     Returns:
         Its pose (D,) relative to the camera's axes, or None when nothing explains the depth well enough.
     """
-    settings = SearchSettings(islands=4, population=800, survivors=40, generations=12, scale_spread=0.0)
+    settings = SearchSettings(islands=10, kept=4, generations=25, scale_spread=0.0)
     for region in find_regions(frame)[:2]:
         observation = observe(frame, region.centre, region.radius)
         if observation.is_empty:
