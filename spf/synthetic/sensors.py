@@ -248,7 +248,7 @@ def _shadowed(sensor: Sensor, z: Image) -> Image:
     seen_at = columns - disparity  # column in the right eye; a nearer surface further right may already cover it
     after = np.minimum.accumulate(np.where(z > 0.0, seen_at, np.inf)[:, ::-1], axis=1)[:, ::-1]
     covered = np.zeros(z.shape, dtype=bool)
-    covered[:, :-1] = after[:, 1:] < seen_at[:, :-1] - 1.0
+    covered[:, :-1] = after[:, 1:] < seen_at[:, :-1]
     return np.where(covered, np.float32(0.0), z)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from spf.errors import SettingError
 from spf.frame import Truth
 from spf.hand.kinematics import joints_of, pose_hand
-from spf.hand.model import Hand
+from spf.hand.model import Hand, mirrored
 from spf.hand.shape import HandShape
 from spf.kernels.render import FAR
 from spf.sessions import Session
@@ -176,7 +176,7 @@ def _stage(settings: SyntheticSettings, shape: HandShape) -> _Stage:
     hand = shape.hand()
     rng = np.random.default_rng([settings.seed, 1])
     view = _view(settings, sensor, rng)
-    mover = hand if shape.side == "right" else shape._replace(side="right").hand()
+    mover = hand if shape.side == "right" else mirrored(hand)  # motions are written for a right hand
     trajectory = make_trajectory(
         mover, MOTIONS[settings.motion], view, settings.frames, settings.speed_mm, sensor.fps, rng
     )
