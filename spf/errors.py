@@ -1,6 +1,14 @@
 """The errors that a user can cause, each one sentence that says what is wrong and what to do."""
 
-__all__ = ["HandError", "SessionError", "SettingError", "SpfError", "StartError"]
+__all__ = [
+    "HandError",
+    "RenderError",
+    "RenderUnavailableError",
+    "SessionError",
+    "SettingError",
+    "SpfError",
+    "StartError",
+]
 
 
 class SpfError(Exception):
@@ -21,3 +29,11 @@ class HandError(SpfError):
 
 class StartError(SpfError):
     """No believable first pose could be found."""
+
+
+class RenderError(SpfError):
+    """A picture could not be drawn; the next one may be."""
+
+
+class RenderUnavailableError(RenderError):
+    """This machine cannot draw three-dimensional pictures until something is installed."""

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from spf.cost.settings import CostSettings
 from spf.cost.spheres import digit_spheres
 from spf.hand.model import Hand
-from spf.kernels.cost import CostWeights, Spheres
+from spf.kernels.cost import CostWeights, Spheres, allocate
 from spf.kernels.render import golden_energies
-from spf.kernels.smd import SmdParameters, evaluate_poses
+from spf.kernels.smd import SmdParameters, evaluate_poses, match_pixels, see
 from spf.observation import Observation
 
-__all__ = ["Problem", "costs", "golden", "make_problem"]
+__all__ = ["Correspondences", "Problem", "correspondences", "costs", "golden", "make_problem"]
 
 Array = NDArray[np.float64]
 GOLDEN_TRUNCATION = 0.04  # T, m
-_POOL = 90  # observed pixels that are matched anew each round
+POOL = 90  # observed pixels that are matched anew each round
 _MATCH_RADIUS = 0.06  # m
 
 
@@ -52,10 +52,11 @@ def make_problem(
     reference: Array,
     rng: np.random.Generator,
     spheres: Spheres | None = None,
+    pool: int = POOL,
 ) -> Problem:
     """Set up the cost of a frame; draws the pool of observed pixels."""
     pixels = observation.arrays.pixels
-    chosen = rng.choice(len(pixels), size=min(_POOL, len(pixels)), replace=False) if len(pixels) else []
+    chosen = rng.choice(len(pixels), size=min(pool, len(pixels)), replace=False) if len(pixels) else []
     floor = np.array([10.0 * settings.points] * 3 + [0.01 * settings.points] * (hand.dofs - 3))
     return Problem(
         hand,
@@ -97,3 +98,38 @@ def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple
         np.ascontiguousarray(scales), problem.reference, GOLDEN_TRUNCATION, energies, overlaps,
     )  # fmt: skip
     return energies, overlaps
+
+
+class Correspondences(NamedTuple):
+    """What is compared with what in one pose.
+
+    Attributes:
+        vertices, normals: (V, 3) the posed skin.
+        visible: (n,) vertices that the camera sees.
+        matches: (m,) vertex matched to each pixel of the problem's pool; -1 for none.
+    """
+
+    vertices: Array
+    normals: Array
+    visible: NDArray[np.int32]
+    matches: NDArray[np.int32]
+
+
+def correspondences(problem: Problem, pose: Array) -> Correspondences:
+    """Pose the hand (D,), and find what the camera sees of it and which vertex each observed pixel belongs to."""
+    hand, arrays = problem.hand, problem.observation.arrays
+    count = len(hand.skin.vertices)
+    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone))
+    vertices, normals = np.empty((count, 3)), np.empty((count, 3))
+    projected, coarse = np.empty((count, 3), np.float32), np.empty((len(hand.proxy.vertices), 3), np.float32)
+    depth, visible = np.empty(arrays.grid_depth.shape, np.float32), np.empty(count, np.int32)
+    seen = see(
+        hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, arrays, np.ascontiguousarray(pose), problem.reference,
+        True, work, vertices, normals, projected, depth, coarse, visible,
+    )  # fmt: skip
+    matches = np.empty(len(problem.data_pool), np.int32)
+    match_pixels(
+        vertices, normals, visible, seen, arrays, work.frames, np.ascontiguousarray(pose), problem.data_pool,
+        problem.match_radius, matches,
+    )  # fmt: skip
+    return Correspondences(vertices, normals, visible[:seen].copy(), matches)

@@ -1,0 +1,234 @@
+"""The automatic first pose: hand found, its side and size estimated, hypotheses believed only after several frames.
+
+No human and no truth is involved. Hypotheses of both sides are searched in the first frame in which something of a hand's
+size is seen, by rendering (:mod:`spf.search`); the best of each side are then tracked for some frames, and the one that goes
+on explaining the depth wins. A wrong side or size may explain one frame, but seldom a hand that moves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.calibrate import View, fit_shape
+from spf.cost.problem import golden, make_problem
+from spf.cost.spheres import digit_spheres
+from spf.errors import StartError
+from spf.filters import smart
+from spf.frame import Frame
+from spf.hand.kinematics import angles_of, joints_of, rotation_about
+from spf.hand.model import Hand, Side, load_hand
+from spf.hand.shape import HandShape
+from spf.observation import Observation, observe
+from spf.optimisers.smd import optimise
+from spf.parallel import map_threads
+from spf.search import SearchSettings, search
+from spf.segmentation import find_regions
+
+__all__ = ["Start", "find_start", "locate", "reach_of"]
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+DOUBTFUL = 0.42  # mean golden energy over the validation above which a start is not believed
+_SIDES: tuple[Side, Side] = ("right", "left")
+_VALIDATION_FRAMES = 12
+_CALIBRATION_FRAMES = 48
+_VIEWS = 12
+_PER_SIDE = 4
+_APART = 0.025  # m of mean joint distance between two hypotheses worth following
+
+
+class Start(NamedTuple):
+    """A first pose.
+
+    Attributes:
+        frame: index of the frame that it is for.
+        pose: (D,) relative to ``reference``, of the hand of ``shape``.
+        reference: (3, 3) R_ref.
+        shape: side, size and shape of the hand.
+        golden: mean golden energy over the validation: 0 explains all, above DOUBTFUL is not believed.
+        margin: by how much the other side explained less.
+    """
+
+    frame: int
+    pose: Array
+    reference: Array
+    shape: HandShape
+    golden: float
+    margin: float
+
+    @property
+    def doubt(self) -> str:
+        """One sentence why the start may be wrong, or ""."""
+        if self.golden > DOUBTFUL:
+            return (
+                f"The first pose may be wrong (its render explains the depth poorly, {self.golden:.2f}): "
+                "give one with --init POSE.json, or begin at a frame that shows an open hand."
+            )
+        if self.margin < 0.01:
+            return (
+                f"The side may be wrong: a {self.shape.side} hand explains the depth hardly better than the other; "
+                "give the hand with --hand HAND.json if you know it."
+            )
+        return ""
+
+
+class _Hypothesis(NamedTuple):
+    shape: HandShape
+    pose: Array
+    energy: float
+
+
+def reach_of(hand: Hand) -> float:
+    """Radius (m) around the palm's centre that holds the hand and some of the arm."""
+    return 0.85 * hand.length + 0.02
+
+
+def find_start(
+    frames: Sequence[Frame],
+    rng: np.random.Generator,
+    *,
+    side: Side | None = None,
+    shape: HandShape | None = None,
+    progress: Progress | None = None,
+) -> Start:
+    """Find the first pose, and the hand's shape unless it is given.
+
+    Args:
+        frames: the session's frames from the first on; some dozens are looked at.
+        rng: randomness.
+        side: of the hand when the session states it; None to find out.
+        shape: of the hand when it is known; None to calibrate it from the depth.
+        progress: called with what is being done and the share done.
+
+    Raises:
+        StartError: no frame shows anything of a hand's size.
+    """
+    report = progress or (lambda _text, _share: None)
+    sides = (shape.side,) if shape else (side,) if side else _SIDES
+    for index in range(len(frames)):
+        report("Looking for a hand", index / len(frames))
+        hypotheses = _hypotheses(frames[index], sides, shape, rng)
+        if hypotheses:
+            break
+    else:
+        raise StartError("No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'.")
+    report("Following the hypotheses", 0.2)
+    ahead = list(frames[index : index + _VALIDATION_FRAMES])
+    energies = np.array([_follow(h, ahead, rng) for h in hypotheses])
+    best = int(np.argmin(energies))
+    others = [e for h, e in zip(hypotheses, energies, strict=True) if h.shape.side != hypotheses[best].shape.side]
+    margin = float(min(others) - energies[best]) if others else 1.0
+    chosen = hypotheses[best]
+    if shape is None:
+        chosen, energy = _calibrated(frames[index : index + _CALIBRATION_FRAMES], chosen, rng, report)
+    else:
+        energy = float(energies[best])
+    reference = np.eye(3)
+    return Start(index, chosen.pose, reference, chosen.shape, min(energy, float(energies[best])), margin)
+
+
+def _hypotheses(
+    frame: Frame, sides: Sequence[Side], shape: HandShape | None, rng: np.random.Generator
+) -> list[_Hypothesis]:
+    """The best different hypotheses of each side, over the places where a hand may be."""
+    regions = find_regions(frame)[:2]
+    result: list[_Hypothesis] = []
+    for side in sides:
+        hand = shape.hand() if shape else load_hand(side)
+        settings = SearchSettings(scale_spread=0.0 if shape else 0.3)
+        found: list[_Hypothesis] = []
+        for region in regions:
+            observation = observe(frame, region.centre, region.radius)
+            if observation.is_empty:
+                continue
+            for scale, pose, energy in locate(hand, observation, region.points, settings, rng):
+                base = shape or HandShape(side, scale=scale)
+                found.append(_Hypothesis(base, pose, energy))
+        result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
+    return result
+
+
+def locate(
+    hand: Hand, observation: Observation, places: Array, settings: SearchSettings, rng: np.random.Generator
+) -> list[tuple[float, Array, float]]:
+    """Search one observation: [(scale, pose (D,) relative to the camera's axes, golden energy)], best first.
+
+    The survivors of the search are polished by SMD, at the size that the search gave each.
+    """
+    cost = smart.SpfSettings()
+    problem = make_problem(hand, observation, cost, np.eye(3), rng)
+    found = search(problem, places, settings, rng)
+    chosen = range(0, min(24, len(found.scales)), 2)
+    seeds = rng.spawn(len(chosen))
+
+    def polish(item: tuple[int, np.random.Generator]) -> tuple[float, Array, float]:
+        index, seed = item
+        scale, rough = float(found.scales[index]), found.poses[index]
+        sized = make_problem(hand.scaled(scale), observation, cost, np.eye(3), seed)
+        pose, _, _ = optimise(sized, cost, seed, rough)
+        before, after = golden(sized, np.stack([rough, pose]))[0]
+        return (scale, pose, float(after)) if after < before else (scale, rough, float(before))
+
+    return sorted(map_threads(polish, zip(chosen, seeds, strict=True)), key=lambda item: item[2])
+
+
+def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:
+    kept: list[_Hypothesis] = []
+    places: list[Array] = []
+    for hypothesis in hypotheses:
+        joints = joints_of(load_hand(hypothesis.shape.side).scaled(hypothesis.shape.scale), hypothesis.pose)
+        if all(np.linalg.norm(joints - other, axis=1).mean() > _APART for other in places):
+            kept.append(hypothesis)
+            places.append(joints)
+        if len(kept) == most:
+            break
+    return kept
+
+
+def _follow(hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator) -> float:
+    """Mean golden energy of a hypothesis that is tracked over some frames."""
+    states = _track(hypothesis, frames, rng)
+    return float(np.mean([info.estimate_golden for _, _, info in states]))
+
+
+def _track(
+    hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator
+) -> list[tuple[Observation, smart.State, smart.StepInfo]]:
+    hand, settings = hypothesis.shape.hand(), smart.SpfSettings()
+    spheres = digit_spheres(hand)
+    state = smart.start(hand, hypothesis.pose, np.eye(3), frames[0].time - 1 / 30, settings)
+    result = []
+    for frame in frames:
+        observation = observe(frame, state.estimate[:3], reach_of(hand))
+        if observation.is_empty:
+            break
+        state, info = smart.step(rng, state, observation, hand, settings, spheres=spheres)
+        result.append((observation, state, info))
+    return result
+
+
+def _calibrated(
+    frames: Sequence[Frame], hypothesis: _Hypothesis, rng: np.random.Generator, report: Progress
+) -> tuple[_Hypothesis, float]:
+    """Fit the shape to what the hypothesis tracks, its size first, and take the first frame's pose along."""
+    shape, pose, energy = hypothesis.shape, hypothesis.pose, hypothesis.energy
+    for turn, refine in enumerate((False, True)):
+        report("Calibrating the hand", 0.4 + 0.3 * turn)
+        tracked = _track(_Hypothesis(shape, pose, energy), frames, rng)
+        every = max(1, len(tracked) // _VIEWS)
+        views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
+        shape, views, energy = fit_shape(views, shape, rng, iterations=8, refine=refine)
+        pose = _relative_to_camera(views[0])
+    return _Hypothesis(shape, pose, energy), energy
+
+
+def _relative_to_camera(view: View) -> Array:
+    """A view's pose, with its palm's angles relative to the camera's axes."""
+    pose = view.pose.copy()
+    pose[3:6] = angles_of(rotation_about(pose[3:6]) @ view.reference)
+    return pose
