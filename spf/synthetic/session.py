@@ -41,7 +41,7 @@ class SyntheticSettings(Settings):
     frames: int = setting(120, "number of frames", group="motion", low=1, high=100_000)
     speed_mm: float = setting(
         9.0, "mean motion of the joints from frame to frame (4 slow, 9 medium, 16 fast), mm",
-        group="motion", low=0.5, high=40.0, unit="mm",
+        group="motion", low=0.5, high=60.0, unit="mm",
     )  # fmt: skip
     seed: int = setting(0, "seed of everything random", group="motion", low=0, high=2**31 - 1)
     absent_from: int = setting(0, "first frame without the hand", group="motion", low=0, high=100_000)
