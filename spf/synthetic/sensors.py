@@ -5,7 +5,8 @@ and counts. Noise is Gaussian with the standard deviation
 
     σ(z) = floor + quadratic · z²
 
-of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it.
+of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it. On captured hands the residual
+of a local fit is 1.3 mm (Kinect v2, neighbours correlated by 0.6) and 1.5 mm (Senz3D, 0.2); the models leave 1.4 and 2.1 mm.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ SENSORS: dict[str, Sensor] = {
         near=0.45,
         far=4.5,
         distance=0.65,
-        noise_floor=0.0010,
+        noise_floor=0.0014,
         noise_quadratic=0.0012,
         grain=3,
         grainy=0.9,
