@@ -94,7 +94,8 @@ def fit_shape(
     shape = _shape(first, parameters)
     hand = shape.hand()
     energies = [
-        golden(make_problem(hand, view.observation, settings, view.reference, rng), view.pose[None])[0][0] for view in views
+        golden(make_problem(hand, view.observation, settings, view.reference, rng), view.pose[None])[0][0]
+        for view in views
     ]
     return shape, views, float(np.mean(energies))
 
@@ -198,5 +199,3 @@ def _repose(
         return view._replace(pose=pose)
 
     return map_threads(run, list(zip(views, seeds, strict=True)))
-
-

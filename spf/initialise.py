@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.calibrate import View, fit_shape
-from spf.cost.problem import golden, make_problem
+from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.errors import StartError
 from spf.filters import smart
@@ -25,10 +25,10 @@ from spf.hand.shape import HandShape
 from spf.observation import Observation, observe
 from spf.optimisers.smd import optimise
 from spf.parallel import map_threads
-from spf.search import SearchSettings, search
+from spf.search import Hypotheses, SearchSettings, refine, search
 from spf.segmentation import find_regions
 
-__all__ = ["Start", "find_start", "locate", "reach_of"]
+__all__ = ["Start", "find_start", "locate", "reach_of", "recover"]
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -39,6 +39,7 @@ _VALIDATION_FRAMES = 12
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
 _PER_SIDE = 4
+_POLISHED = 10  # hypotheses that SMD is run from
 _APART = 0.025  # m of mean joint distance between two hypotheses worth following
 
 
@@ -116,7 +117,9 @@ def find_start(
         if hypotheses:
             break
     else:
-        raise StartError("No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'.")
+        raise StartError(
+            "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
+        )
     report("Following the hypotheses", 0.2)
     ahead = list(frames[index : index + _VALIDATION_FRAMES])
     energies = np.array([_follow(h, ahead, rng) for h in hypotheses])
@@ -150,7 +153,8 @@ def _hypotheses(
                 base = shape or HandShape(side, scale=scale)
                 found.append(_Hypothesis(base, pose, energy))
         result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
-    return result
+    least = min((h.energy for h in result), default=0.0)
+    return [h for h in result if h.energy < 1.5 * least + 0.05]
 
 
 def locate(
@@ -158,23 +162,70 @@ def locate(
 ) -> list[tuple[float, Array, float]]:
     """Search one observation: [(scale, pose (D,) relative to the camera's axes, golden energy)], best first.
 
-    The survivors of the search are polished by SMD, at the size that the search gave each.
+    A global search by rendering, its best polished by SMD at the size that the search gave each, a finer search from
+    those, and SMD again.
     """
     cost = smart.SpfSettings()
     problem = make_problem(hand, observation, cost, np.eye(3), rng)
     found = search(problem, places, settings, rng)
-    chosen = range(0, min(24, len(found.scales)), 2)
-    seeds = rng.spawn(len(chosen))
+    for _ in range(2):
+        distinct = _spaced(hand, found, _POLISHED)
+        polished = _polish(problem, cost, found.poses[distinct], found.scales[distinct], rng)
+        poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
+        found = refine(problem, poses, scales, settings._replace(generations=6), rng)
+    return sorted(polished, key=lambda item: item[2])
 
-    def polish(item: tuple[int, np.random.Generator]) -> tuple[float, Array, float]:
-        index, seed = item
-        scale, rough = float(found.scales[index]), found.poses[index]
-        sized = make_problem(hand.scaled(scale), observation, cost, np.eye(3), seed)
+
+def _spaced(hand: Hand, found: Hypotheses, most: int) -> list[int]:
+    """Indices of the best hypotheses that differ from each other."""
+    kept: list[int] = []
+    joints: list[Array] = []
+    for index, pose in enumerate(found.poses):
+        own = joints_of(hand, pose)
+        if all(np.linalg.norm(own - other, axis=1).mean() > _APART / 2 for other in joints):
+            kept.append(index)
+            joints.append(own)
+        if len(kept) == most:
+            break
+    return kept
+
+
+def _polish(
+    problem: Problem, cost: smart.SpfSettings, poses: Array, scales: Array, rng: np.random.Generator
+) -> list[tuple[float, Array, float]]:
+    """SMD from each pose at its own scale; (scale, pose, golden energy), never worse than before."""
+
+    def run(item: tuple[Array, float, np.random.Generator]) -> tuple[float, Array, float]:
+        rough, scale, seed = item
+        sized = make_problem(problem.hand.scaled(scale), problem.observation, cost, np.eye(3), seed)
         pose, _, _ = optimise(sized, cost, seed, rough)
         before, after = golden(sized, np.stack([rough, pose]))[0]
         return (scale, pose, float(after)) if after < before else (scale, rough, float(before))
 
-    return sorted(map_threads(polish, zip(chosen, seeds, strict=True)), key=lambda item: item[2])
+    return map_threads(run, list(zip(poses, scales, rng.spawn(len(poses)), strict=True)))
+
+
+def recover(frame: Frame, hand: Hand, usual: float, rng: np.random.Generator) -> Array | None:
+    """Look for a lost hand of known shape in a frame.
+
+    Args:
+        frame: the depth image.
+        hand: the calibrated hand.
+        usual: golden energy that it is tracked with.
+        rng: randomness.
+
+    Returns:
+        Its pose (D,) relative to the camera's axes, or None when nothing explains the depth well enough.
+    """
+    settings = SearchSettings(islands=4, population=800, survivors=40, generations=12, scale_spread=0.0)
+    for region in find_regions(frame)[:2]:
+        observation = observe(frame, region.centre, region.radius)
+        if observation.is_empty:
+            continue
+        found = locate(hand, observation, region.points, settings, rng)
+        if found and found[0][2] < max(1.4 * usual + 0.08, 0.35):
+            return found[0][1]
+    return None
 
 
 def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:
@@ -201,7 +252,7 @@ def _track(
 ) -> list[tuple[Observation, smart.State, smart.StepInfo]]:
     hand, settings = hypothesis.shape.hand(), smart.SpfSettings()
     spheres = digit_spheres(hand)
-    state = smart.start(hand, hypothesis.pose, np.eye(3), frames[0].time - 1 / 30, settings)
+    state = smart.start(hand, hypothesis.pose, np.eye(3), frames[0].time - 1 / 30, settings.n)
     result = []
     for frame in frames:
         observation = observe(frame, state.estimate[:3], reach_of(hand))

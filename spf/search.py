@@ -15,24 +15,28 @@ from scipy.spatial.transform import Rotation
 
 from spf.cost.problem import Problem, golden
 from spf.hand.model import Hand
+from spf.parallel import map_threads
 
-__all__ = ["Hypotheses", "SearchSettings", "search"]
+__all__ = ["Hypotheses", "SearchSettings", "refine", "search"]
 
 Array = NDArray[np.float64]
+_SPREAD = (0.3, 0.05, -0.2, -0.45)  # rad of abduction of index … little in a hand spread wide
 
 
 class SearchSettings(NamedTuple):
     """Effort of a search.
 
     Attributes:
-        population: hypotheses in the first generation.
+        islands: independent populations, searched in parallel: what one misses another finds.
+        population: hypotheses in an island's first generation.
         survivors: how many are kept.
         generations: number of generations after the first.
         scale_mean, scale_spread: prior of the hand's scale, mean and standard deviation of its logarithm; 0 fixes it.
     """
 
-    population: int = 3000
-    survivors: int = 150
+    islands: int = 6
+    population: int = 1500
+    survivors: int = 60
     generations: int = 16
     scale_mean: float = 1.0
     scale_spread: float = 0.15
@@ -67,16 +71,49 @@ def search(problem: Problem, places: Array, settings: SearchSettings, rng: np.ra
         places: (M, 3) m, points of the surface where the palm may be.
         settings: effort and size prior.
         rng: randomness.
+
+    Returns:
+        The survivors of all islands.
     """
-    genes = _random_genes(problem.hand, places, settings.population, settings, rng)
+
+    def island(stream: np.random.Generator) -> tuple[_Genes, Array]:
+        genes = _random_genes(problem.hand, places, settings, stream)
+        return _evolve(problem, genes, settings, stream, 1.0)
+
+    return _merge(map_threads(island, rng.spawn(settings.islands)))
+
+
+def refine(
+    problem: Problem, poses: Array, scales: Array, settings: SearchSettings, rng: np.random.Generator
+) -> Hypotheses:
+    """Search on from poses (N, D) with scales (N,) that are nearly right: small perturbations, digits recombined."""
+    genes = _Genes(poses[:, :3], Rotation.from_euler("XYZ", poses[:, 3:6]).as_quat(), poses[:, 6:], scales)
+
+    def island(stream: np.random.Generator) -> tuple[_Genes, Array]:
+        return _evolve(problem, genes, settings, stream, 0.35)
+
+    return _merge(map_threads(island, rng.spawn(max(1, settings.islands // 3))))
+
+
+def _evolve(
+    problem: Problem, genes: _Genes, settings: SearchSettings, rng: np.random.Generator, spread: float
+) -> tuple[_Genes, Array]:
+    """Evolve a population; ``spread`` is the size of the first perturbations. Returns the survivors, best first."""
     energies = _judge(problem, genes, settings)
     for generation in range(settings.generations):
         best = np.argsort(energies)[: settings.survivors]
         parents, parent_energies = _take(genes, best), energies[best]
-        shrink = 0.8**generation
+        shrink = spread * 0.82**generation
         children = _offspring(problem.hand, parents, 4 * settings.survivors, shrink, settings, rng)
         genes = _Genes(*(np.concatenate(pair) for pair in zip(parents, children, strict=True)))
         energies = np.concatenate([parent_energies, _judge(problem, children, settings)])
+    best = np.argsort(energies)[: settings.survivors]
+    return _take(genes, best), energies[best]
+
+
+def _merge(islands: list[tuple[_Genes, Array]]) -> Hypotheses:
+    energies = np.concatenate([energy for _, energy in islands])
+    genes = _Genes(*(np.concatenate(parts) for parts in zip(*(genes for genes, _ in islands), strict=True)))
     order = np.argsort(energies)
     genes = _take(genes, order)
     return Hypotheses(_poses(genes), genes.scales, energies[order])
@@ -99,7 +136,8 @@ def _judge(problem: Problem, genes: _Genes, settings: SearchSettings) -> Array:
     return energies
 
 
-def _random_genes(hand: Hand, places: Array, count: int, settings: SearchSettings, rng: np.random.Generator) -> _Genes:
+def _random_genes(hand: Hand, places: Array, settings: SearchSettings, rng: np.random.Generator) -> _Genes:
+    count = settings.population
     at = places[rng.integers(len(places), size=count)] + np.array([0.0, 0.0, 0.015])
     turns = rng.normal(size=(count, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
@@ -111,13 +149,14 @@ def random_digits(hand: Hand, count: int, rng: np.random.Generator) -> Array:
     """Draw plausible angles of the digits (count, D - 6): each finger somewhere between straight and curled."""
     limits = hand.limits[6:]
     digits = np.empty((count, hand.dofs - 6))
+    spread = rng.uniform(-0.2, 1.2, size=count)
     digits[:, :4] = rng.uniform(0.7 * limits[:4, 0], 0.7 * limits[:4, 1], size=(count, 4))
-    together = rng.beta(0.5, 0.5, size=(count, 1))
+    together = rng.beta(0.5, 0.5, size=(count, 1)) * (rng.random((count, 1)) < 0.6)  # an open hand is the likeliest
     for finger in range(4):
         own = rng.beta(0.4, 0.5, size=(count, 1))
-        curl = np.where(rng.random((count, 1)) < 0.6, together, own)[:, 0]
+        curl = np.where(rng.random((count, 1)) < 0.7, together, own)[:, 0]
         first = 4 + 4 * finger
-        digits[:, first] = rng.normal(scale=0.1, size=count)
+        digits[:, first] = _SPREAD[finger] * spread + rng.normal(scale=0.06, size=count)
         digits[:, first + 1] = 1.3 * curl + rng.normal(scale=0.2, size=count)
         digits[:, first + 2] = 0.0
         digits[:, first + 3] = 1.6 * curl + rng.normal(scale=0.2, size=count)
@@ -138,10 +177,14 @@ def _offspring(
     for columns in digit_columns(hand):
         swap = rng.random(count) < 0.25
         digits[np.ix_(swap, columns)] = parents.digits[np.ix_(second[swap], columns)]
+    fan = np.where(rng.random(count) < 0.25, rng.normal(scale=0.3, size=count), 0.0)
+    for finger in range(4):
+        digits[:, 4 + 4 * finger] += _SPREAD[finger] * fan
     touched = rng.random(digits.shape) < 0.3
     digits += touched * rng.normal(scale=0.15 + 0.5 * shrink, size=digits.shape)
+    turns = _shift_fingers(hand, digits, parents.turns[first], rng)
     turn = Rotation.from_rotvec(rng.normal(scale=0.03 + 0.4 * shrink, size=(count, 3)))
-    turns = (turn * Rotation.from_quat(parents.turns[first])).as_quat()
+    turns = (turn * Rotation.from_quat(turns)).as_quat()
     places = parents.places[first] + rng.normal(scale=0.002 + 0.015 * shrink, size=(count, 3))
     scales = parents.scales[first]
     if settings.scale_spread > 0:
@@ -149,6 +192,25 @@ def _offspring(
         low = settings.scale_mean * np.exp(-3 * settings.scale_spread)
         scales = np.clip(scales, low, settings.scale_mean**2 / low)
     return _Genes(places, turns, np.clip(digits, hand.limits[6:, 0], hand.limits[6:, 1]), scales)
+
+
+def _shift_fingers(hand: Hand, digits: Array, turns: Array, rng: np.random.Generator) -> Array:
+    """Move the fingers of some hypotheses to their neighbours' places, and turn the palm to match; returns the turns.
+
+    The way out of the commonest minimum, fingers fitted to their neighbours.
+    """
+    chosen = np.flatnonzero(rng.random(len(digits)) < 0.1)
+    fingers = digits[:, 4:20].reshape(-1, 4, 4)
+    direction = rng.choice([-1, 1], size=len(chosen))
+    source = np.clip(np.arange(4) + direction[:, None], 0, 3)
+    fingers[chosen] = fingers[chosen[:, None], source]
+    digits[:, 4:20] = fingers.reshape(-1, 16)
+    mirror = 1.0 if hand.side == "right" else -1.0
+    about_normal = np.zeros((len(chosen), 3))
+    about_normal[:, 1] = mirror * direction * rng.uniform(0.15, 0.35, size=len(chosen))
+    turns = turns.copy()
+    turns[chosen] = (Rotation.from_quat(turns[chosen]) * Rotation.from_rotvec(about_normal)).as_quat()
+    return turns
 
 
 def digit_columns(hand: Hand) -> list[list[int]]:

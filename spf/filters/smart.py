@@ -98,7 +98,7 @@ class StepInfo(NamedTuple):
         optimised_share: weight of the optimised half.
         window: h that was used.
         estimate: (D,) pose, relative to ``reference``.
-        estimate_golden, estimate_overlap, estimate_cost: of the estimate.
+        estimate_golden, estimate_overlap, estimate_cost, estimate_log_likelihood: of the estimate.
         trajectories: N trajectories of SMD, or () when not recorded.
         evaluations: cost evaluations in the frame.
         timings: seconds by stage.
@@ -123,15 +123,16 @@ class StepInfo(NamedTuple):
     estimate_golden: float
     estimate_overlap: float
     estimate_cost: float
+    estimate_log_likelihood: float
     trajectories: tuple[SmdTrace, ...]
     evaluations: int
     timings: dict[str, float]
 
 
-def start(hand: Hand, pose: Array, reference: Array, time_: float, settings: SpfSettings) -> State:
-    """Begin with all particles at one pose (D,) relative to ``reference``, at rest."""
-    poses = np.repeat(np.asarray(pose, dtype=np.float64)[None], settings.n, axis=0)
-    uniform = np.full(settings.n, -math.log(settings.n))
+def start(hand: Hand, pose: Array, reference: Array, time_: float, count: int) -> State:
+    """Begin with ``count`` particles at one pose (D,) relative to ``reference``, at rest."""
+    poses = np.repeat(np.asarray(pose, dtype=np.float64)[None], count, axis=0)
+    uniform = np.full(count, -math.log(count))
     particles = ParticleSet(hand.constrain(poses), np.zeros_like(poses), uniform)
     return _recentred(State(particles, np.asarray(reference, dtype=np.float64), particles.poses[0], time_))
 
@@ -177,11 +178,11 @@ def step(
     window, log_c = _correction(hand, predicted, optimised, settings, interval)
     clock("correct")
     energy, golden_energy, overlap = _judge(problem, samples)
-    log_likelihood = -(energy + settings.golden * settings.points * golden_energy) / settings.sigma2
-    log_weights = normalise(log_c + log_likelihood)  # (e) weigh
+    log_likelihood = _log_likelihood(energy, golden_energy, settings)
+    log_weights = normalise(log_c + log_likelihood + _kept(settings))  # (e) weigh
     clock("weigh")
     estimate = weighted_mean(samples, log_weights)  # (f) estimate
-    estimate_energy, estimate_golden, estimate_overlap = (part[0] for part in _judge(problem, estimate[None]))
+    estimate_energy, estimate_golden, estimate_overlap = (float(part[0]) for part in _judge(problem, estimate[None]))
     clock("estimate")
     velocities = (samples - np.concatenate([before, before])) / interval
     new = State(ParticleSet(samples, velocities, log_weights), state.reference, estimate, observation.time)
@@ -189,7 +190,8 @@ def step(
     info = StepInfo(
         state.reference, ancestors, origins, predicted, optimised, energy[:count], energy[count:], golden_energy, overlap,
         log_likelihood, log_c, log_weights, ess(log_weights), float(np.exp(log_weights[count:]).sum()), window,
-        estimate, float(estimate_golden), float(estimate_overlap), float(estimate_energy), trajectories,
+        estimate, estimate_golden, estimate_overlap, estimate_energy,
+        float(_log_likelihood(estimate_energy, estimate_golden, settings)), trajectories,
         iterations + screened + len(samples) + 1, clock.seconds,
     )  # fmt: skip
     return _recentred(new), info
@@ -232,6 +234,16 @@ def _correction(
     if not settings.correction:
         return window, np.zeros(2 * len(predicted))
     return window, log_correction(white, white_optimised, window)
+
+
+def _log_likelihood(energy: Array | float, golden_energy: Array | float, settings: SpfSettings) -> Array | float:
+    """log p(z|s) = -E/σ² (6), E joined by the rendered comparison; up to a constant."""
+    return -(energy + settings.golden * settings.points * golden_energy) / settings.sigma2
+
+
+def _kept(settings: SpfSettings) -> Array:
+    """Log-prior of the samples: -inf for predicted ones that are not kept."""
+    return np.repeat([0.0 if settings.keep_predicted else -np.inf, 0.0], settings.n)
 
 
 def _judge(problem: Problem, poses: Array) -> tuple[Array, Array, Array]:

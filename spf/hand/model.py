@@ -223,6 +223,8 @@ def assemble_hand(
     )
     skin = _skin(vertices, faces, weights)
     proxy_vertices, proxy_faces = _simplified(vertices, faces)
+    # what lies beyond the wrist is arm: it bends as the palm does not
+    proxy_faces = np.ascontiguousarray(proxy_faces[(proxy_vertices[proxy_faces, 2] < bind[0, 2, 3]).any(axis=1)])
     nearest = cKDTree(vertices).query(proxy_vertices)[1]
     proxy = _skin(proxy_vertices, proxy_faces, weights[nearest])
     names = DOF_NAMES + (FREE_DIP_NAMES if free_dip else ())

@@ -1,0 +1,193 @@
+"""Run a tracker over a session: Frame → observe → step, loss noticed and recovered, every frame's result kept.
+
+``track_frame(tracking, state, frame)`` is a pure function of its arguments: a frame's randomness comes from the run's seed
+and the frame's index, so that any frame can be repeated, and a run is repeated bit for bit by what its manifest stores.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.cost.spheres import digit_spheres
+from spf.filters import smart
+from spf.frame import Frame
+from spf.hand.kinematics import joints_of
+from spf.hand.model import Hand
+from spf.initialise import Start, reach_of, recover
+from spf.kernels.cost import Spheres
+from spf.observation import Observation, observe
+from spf.settings import Settings
+from spf.trackers import TRACKERS
+
+__all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "run", "track_frame"]
+
+Array = NDArray[np.float64]
+_HISTORY = 30  # golden energies that a loss is judged against
+_PATIENCE = 3  # bad frames in a row that make a loss
+_FIRST_EFFORT = 3.0
+
+
+class Tracking(NamedTuple):
+    """What stays the same during a run.
+
+    Attributes:
+        tracker: name in the table of trackers.
+        settings: of that tracker.
+        start: first pose and hand shape.
+        hand: of that shape.
+        spheres: of the collision term.
+        seed: of all randomness.
+    """
+
+    tracker: str
+    settings: Settings
+    start: Start
+    hand: Hand
+    spheres: Spheres
+    seed: int
+
+
+class TrackState(NamedTuple):
+    """What a run carries from frame to frame.
+
+    Attributes:
+        filter: state of the tracker.
+        lost: whether the hand is lost.
+        history: recent golden energies of good frames.
+        bad: bad frames in a row.
+        fresh: whether the pose was just found and no frame has refined it.
+    """
+
+    filter: smart.State
+    lost: bool
+    history: tuple[float, ...]
+    bad: int
+    fresh: bool
+
+
+class TrackedFrame(NamedTuple):
+    """The result of one frame.
+
+    Attributes:
+        index, time: of the frame.
+        pose: (D,) the estimate, relative to ``reference``; the last one known while the hand is lost.
+        reference: (3, 3) R_ref.
+        joints: (21, 3) m.
+        lost: whether the hand is lost in this frame.
+        recovered: whether it was found again in this frame.
+        log_likelihood: of the estimate; nan while lost.
+        ess: effective sample size; nan while lost.
+        golden, overlap: how well the render of the estimate explains the depth; nan while lost.
+        seconds: spent on the frame, observation included.
+        timings: seconds by stage.
+        info: everything that happened in the filter; None while lost.
+        observation: what was seen; None while lost.
+    """
+
+    index: int
+    time: float
+    pose: Array
+    reference: Array
+    joints: Array
+    lost: bool
+    recovered: bool
+    log_likelihood: float
+    ess: float
+    golden: float
+    overlap: float
+    seconds: float
+    timings: dict[str, float]
+    info: smart.StepInfo | None
+    observation: Observation | None
+
+
+def begin(
+    tracker: str, settings: Settings, start: Start, seed: int, *, free_dip: bool = False
+) -> tuple[Tracking, TrackState]:
+    """Set up a run from a first pose."""
+    hand = start.shape.hand(free_dip=free_dip)
+    tracking = Tracking(tracker, settings, start, hand, digit_spheres(hand), seed)
+    return tracking, _restart(tracking, start.pose, start.reference, -1.0 / 30.0)
+
+
+def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
+    count = getattr(tracking.settings, "n", 1)
+    state = smart.start(tracking.hand, pose, reference, time_, count)
+    return TrackState(state, False, (), 0, True)
+
+
+def track_frame(
+    tracking: Tracking, state: TrackState, frame: Frame, *, record: bool = False
+) -> tuple[TrackState, TrackedFrame]:
+    """Track one frame.
+
+    Args:
+        tracking: the run; replace its settings and they take effect with this frame.
+        state: after the last frame.
+        frame: the depth image.
+        record: whether to keep the trajectories of SMD in the frame's info.
+
+    Returns:
+        (state, result).
+    """
+    began = time.perf_counter()
+    rng = np.random.default_rng([tracking.seed, frame.index])
+    recovered = False
+    if state.lost:
+        found = recover(frame, tracking.hand, tracking.start.golden, rng)
+        if found is None:
+            return state, _lost(tracking, state, frame, began)
+        recovered = True
+        state = _restart(tracking, found, np.eye(3), frame.time - 1.0 / 30.0)
+    observation = observe(frame, state.filter.estimate[:3], reach_of(tracking.hand))
+    observed = time.perf_counter()
+    if observation.is_empty:
+        state = state._replace(lost=True)
+        return state, _lost(tracking, state, frame, began)
+    filter_state, info = TRACKERS[tracking.tracker].step(
+        rng, state.filter, observation, tracking.hand, tracking.settings,
+        spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
+    )  # fmt: skip
+    new = _judged(state, filter_state, info)
+    joints = joints_of(tracking.hand, info.estimate, info.reference)
+    timings = {"observe": observed - began, **info.timings}
+    seconds = time.perf_counter() - began
+    result = TrackedFrame(
+        frame.index, frame.time, info.estimate, info.reference, joints, new.lost, recovered,
+        info.estimate_log_likelihood, info.ess, info.estimate_golden, info.estimate_overlap, seconds, timings,
+        info, observation,
+    )  # fmt: skip
+    return new, result
+
+
+def _judged(state: TrackState, filter_state: smart.State, info: smart.StepInfo) -> TrackState:
+    """Notice a loss: several frames in a row that the estimate's render explains much worse than usual."""
+    usual = float(np.median(state.history)) if state.history else info.estimate_golden
+    bad = info.estimate_golden > max(1.6 * usual + 0.12, 0.45) or info.estimate_overlap < 0.3
+    count = state.bad + 1 if bad else 0
+    history = state.history if bad else (*state.history, info.estimate_golden)[-_HISTORY:]
+    return TrackState(filter_state, count >= _PATIENCE, history, count, False)
+
+
+def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:
+    nan = float("nan")
+    joints = joints_of(tracking.hand, state.filter.estimate, state.filter.reference)
+    seconds = time.perf_counter() - began
+    return TrackedFrame(
+        frame.index, frame.time, state.filter.estimate, state.filter.reference, joints, True, False,
+        nan, nan, nan, nan, seconds, {"search": seconds}, None, None,
+    )  # fmt: skip
+
+
+def run(
+    tracking: Tracking, state: TrackState, frames: Iterator[Frame], *, record: bool = False
+) -> Iterator[TrackedFrame]:
+    """Track frames one after the other, lazily: stop asking and nothing more is computed."""
+    for frame in frames:
+        state, result = track_frame(tracking, state, frame, record=record)
+        yield result

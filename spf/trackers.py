@@ -1,0 +1,97 @@
+"""The table of trackers by name, with their presets: what the command line, the dashboard and the tests iterate over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from spf.errors import SettingError
+from spf.filters import single, smart
+from spf.hand.model import Hand
+from spf.kernels.cost import Spheres
+from spf.observation import Observation
+from spf.settings import Settings
+
+__all__ = ["PRESETS", "TRACKERS", "Step", "Tracker", "make_settings"]
+
+
+class Step(Protocol):
+    """One frame of a tracker."""
+
+    def __call__(
+        self,
+        rng: np.random.Generator,
+        state: smart.State,
+        observation: Observation,
+        hand: Hand,
+        settings: Any,
+        *,
+        spheres: Spheres | None = None,
+        record: bool = False,
+        effort: float = 1.0,
+    ) -> tuple[smart.State, smart.StepInfo]:
+        """Track one frame; see :func:`spf.filters.smart.step`."""
+        ...
+
+
+class Tracker(NamedTuple):
+    """A tracker by name.
+
+    Attributes:
+        name: as in ``--tracker``.
+        title: for headings.
+        settings: class of its settings.
+        step: one frame.
+    """
+
+    name: str
+    title: str
+    settings: type[Settings]
+    step: Step
+
+
+TRACKERS: dict[str, Tracker] = {
+    tracker.name: tracker
+    for tracker in (
+        Tracker("spf", "Smart Particle Filter", smart.SpfSettings, smart.step),
+        Tracker("smd", "One SMD tracker", single.SingleSettings, single.step),
+    )
+}
+
+#: Changes from the defaults. ``paper`` is the paper's own cost, (3), with its N, |S| and k.
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "paper": {
+        "k": 3.0,
+        "points": 45,
+        "n": 4,
+        "coverage": 0.0,
+        "data_points": 0,
+        "background": 1.0,
+        "collision": 0.0,
+        "robust": False,
+        "zbuffer": False,
+        "golden": 0.0,
+        "structured": 0.0,
+        "prediction_pull": 0.0,
+        "velocity": 1.0,
+    },
+}
+
+
+def make_settings(tracker: str, preset: str = "default", changes: Mapping[str, str] | None = None) -> Settings:
+    """Return a tracker's settings: a preset, then changes given as text.
+
+    Raises:
+        SettingError: there is no such tracker, preset or setting, or a value is out of range.
+    """
+    if tracker not in TRACKERS:
+        raise SettingError(f"There is no tracker '{tracker}'; the trackers are {', '.join(TRACKERS)}.")
+    if preset not in PRESETS:
+        raise SettingError(f"There is no preset '{preset}'; the presets are {', '.join(PRESETS)}.")
+    settings = TRACKERS[tracker].settings()
+    known = {info.name for info in settings.describe()}
+    chosen = {name: value for name, value in PRESETS[preset].items() if name in known}
+    return settings.replace(**chosen).with_text(changes or {})
