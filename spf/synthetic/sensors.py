@@ -5,8 +5,9 @@ and counts. Noise is Gaussian with the standard deviation
 
     σ(z) = floor + quadratic · z²
 
-of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it. On captured hands the residual
-of a local fit is 1.3 mm (Kinect v2, neighbours correlated by 0.6) and 1.5 mm (Senz3D, 0.2); the models leave 1.4 and 2.1 mm.
+of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it. On captured hands the
+residual of a local fit is 1.3 mm (Kinect v2) and 1.5 mm (Senz3D), and neighbours are correlated by 0.6 and 0.2; of the
+models it is 1.4 and 2.1 mm.
 """
 
 from __future__ import annotations
