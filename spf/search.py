@@ -35,8 +35,8 @@ class SearchSettings(NamedTuple):
         scale_mean, scale_spread: prior of the hand's scale, mean and standard deviation of its logarithm; 0 fixes it.
     """
 
-    islands: int = 32
-    kept: int = 10
+    islands: int = 24
+    kept: int = 8
     population: int = 800
     survivors: int = 24
     scouting: int = 14
