@@ -137,12 +137,12 @@ def visible_vertices(points, normals, projected, depth, tolerance, perspective, 
 
 @njit(cache=True, nogil=True, fastmath=True, inline="always")
 def beyond_wrist(dx, dy, dz, ax, ay, az):
-    """Whether a point at (dx, dy, dz) from the wrist is forearm: 1 cm past the wrist's plane, in a wide cone around the arm.
+    """Whether a point at (dx, dy, dz) from the wrist is forearm: past the wrist's plane, in a wide cone around the arm.
 
     (ax, ay, az) is the palm's axis towards the arm. The cone leaves room for a bent wrist.
     """
     along = dx * ax + dy * ay + dz * az
-    if along < 0.01:
+    if along < -0.004:
         return False
     across = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
     return across < 0.045 + 1.2 * along
