@@ -175,14 +175,14 @@ def build_hand(mesh: SkinnedMesh, side: Side, *, free_dip: bool = False) -> Hand
     """Build the hand model from a skinned mesh: 16 bones, their revolute axes, limits and skin.
 
     Raises:
-        HandError: some of the 25 WebXR joints are missing.
+        HandError: some of the 25 WebXR joints are missing, or a joint is scaled.
     """
     index = {name: number for number, name in enumerate(mesh.joint_names)}
     needed = [_webxr_joint(bone) for bone in BONES] + [f"{_webxr_finger(finger)}-tip" for finger in FINGERS]
     missing = [name for name in needed if name not in index]
     if missing:
         raise HandError(f"The hand model lacks the WebXR joints {', '.join(missing)}; name its joints as WebXR does.")
-    bind = np.array([mesh.bind[index[_webxr_joint(bone)]] for bone in BONES])
+    bind = _rigid(np.array([mesh.bind[index[_webxr_joint(bone)]] for bone in BONES]))
     joint_bone, joint_offset = _joints(mesh, index, bind)
     weights = _fold_weights(mesh, index)
     return assemble_hand(
@@ -295,6 +295,16 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> N
 def _relative(parent: NDArray[np.float64], child: NDArray[np.float64]) -> NDArray[np.float64]:
     rotation = parent[:, :3].T @ child[:, :3]
     return np.hstack([rotation, (parent[:, :3].T @ (child[:, 3] - parent[:, 3]))[:, None]])
+
+
+def _rigid(bind: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Make the rotations of bind matrices (B, 4, 4) exact: files hold them in single precision."""
+    left, stretch, right = np.linalg.svd(bind[:, :3, :3])
+    if np.abs(stretch - 1.0).max() > 1e-3 or np.linalg.det(bind[:, :3, :3]).min() < 0.0:
+        raise HandError("The joints of the hand model are scaled or mirrored; apply their scale and export it again.")
+    exact = bind.copy()
+    exact[:, :3, :3] = left @ right
+    return exact
 
 
 def _parents() -> NDArray[np.int32]:
