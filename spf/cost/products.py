@@ -9,11 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from spf.cost.problem import Problem
 from spf.errors import HandError
-from spf.kernels.cost import allocate, cost_products
+from spf.hand.model import Hand
+from spf.kernels.cost import Spheres, Workspace, allocate, cost_products
+from spf.kernels.curvature import gauss_newton_diagonal
 from spf.kernels.smd import match_pixels
 from spf.kernels.smd import see as see_kernel
 
-__all__ = ["Products", "Sample", "products", "see"]
+__all__ = ["Products", "Sample", "curvature", "products", "see"]
 
 Array = NDArray[np.float64]
 
@@ -50,7 +52,7 @@ def see(problem: Problem, pose: ArrayLike) -> Sample:
     """Return all vertices that the camera sees in a pose (D,), and the frame's pool of pixels with their matches."""
     hand, obs, p = problem.hand, problem.observation.arrays, _checked(problem, pose)
     vertices = len(hand.skin.vertices)
-    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone))
+    work = _workspace(hand, problem.spheres)
     points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
     projected = np.empty((vertices, 3), np.float32)
     coarse = np.empty((len(hand.proxy.vertices), 3), np.float32)
@@ -60,7 +62,9 @@ def see(problem: Problem, pose: ArrayLike) -> Sample:
         hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, obs, p, problem.reference,
         bool(problem.settings.zbuffer), work, points, normals, projected, depth, coarse, visible,
     )  # fmt: skip
-    match_pixels(points, normals, visible, count, obs, work.frames, p, problem.data_pool, problem.match_radius, matches)
+    match_pixels(
+        points, normals, visible, count, obs, work.chain.bones, p, problem.data_pool, problem.match_radius, matches
+    )
     return Sample(visible[:count].copy(), problem.data_pool, matches)
 
 
@@ -86,7 +90,7 @@ def products(
         HandError: a pose has the wrong length or is not finite.
     """
     hand, p, v = problem.hand, _checked(problem, pose), _checked(problem, direction)
-    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone))
+    work = _workspace(hand, problem.spheres)
     gradient, product = np.empty(hand.dofs), np.empty(hand.dofs)
     energy = cost_products(
         hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,
@@ -95,6 +99,23 @@ def products(
         p, problem.reference, *sample, v, gradient, product, work,
     )  # fmt: skip
     return Products(float(energy), gradient, product)
+
+
+def curvature(problem: Problem, pose: ArrayLike, sample: Sample, *, precision: ArrayLike | None = None) -> Array:
+    """Return the diagonal (D,) of the Gauss-Newton Hessian whose products :func:`products` gives."""
+    hand, p = problem.hand, _checked(problem, pose)
+    diagonal = np.empty(hand.dofs)
+    gauss_newton_diagonal(
+        hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,
+        np.zeros(hand.dofs) if precision is None else _checked(problem, precision),
+        p, problem.reference, *sample, diagonal, _workspace(hand, problem.spheres),
+    )  # fmt: skip
+    return diagonal
+
+
+def _workspace(hand: Hand, spheres: Spheres) -> Workspace:
+    """Return scratch for one thread."""
+    return allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(spheres.bone), hand.dofs)
 
 
 def _checked(problem: Problem, pose: ArrayLike) -> Array:

@@ -8,7 +8,7 @@ import pytest
 from spf.cost.problem import GOLDEN_TRUNCATION, Problem, costs, golden
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import load_hand
-from spf.kernels.render import compare_depth, project_vertices, rasterise
+from spf.kernels.render import FOREARM_COST, FOREARM_RADIUS, compare_depth, project_vertices, rasterise
 from tests.scenes import CAMERAS, FACING, hand_problem, natural_pose
 
 
@@ -62,19 +62,24 @@ def test_comparison_agrees_with_its_formula(rng: np.random.Generator) -> None:
     outside = rng.random((height, width)).astype(np.float32)
     camera = np.array([50.0, 55.0, 8.0, 6.0, 1.0])
     wrist, axis = np.array([0.0, 0.02, 0.45]), np.array([0.0, 1.0, 0.0])
-    found = compare_depth(rendered, observed, labels, outside, camera, wrist, axis, GOLDEN_TRUNCATION)
+    scale = 0.9
+    found = compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scale, GOLDEN_TRUNCATION)
 
     covered, seen, empty = rendered < 1e8, labels == 1, labels == 0
     v, u = np.mgrid[:height, :width]
     away = np.stack([(u - 8) / 50 * observed, (v - 6) / 55 * observed, observed], axis=-1) - wrist
     along = away @ axis
     across = np.linalg.norm(away - along[..., None] * axis, axis=-1)
-    forearm = (along >= 0.01) & (across < 0.045 + 1.2 * along)
+    beyond = (along >= 0.01) & (across < 0.045 + 1.2 * along)
+    arm = away[~covered & seen & beyond].sum(axis=0)
+    arm /= np.linalg.norm(arm)
+    from_arm = np.linalg.norm(away - (away @ arm)[..., None] * arm, axis=-1)
+    forearm = ~covered & seen & beyond & (from_arm < FOREARM_RADIUS * scale)
     squared = ((rendered.astype(float) - observed) / GOLDEN_TRUNCATION) ** 2
     both, missed, beside = covered & seen, ~covered & seen & ~forearm, covered & empty
-    total = np.minimum(squared[both], 1).sum() + missed.sum() + outside[beside].sum()
+    total = np.minimum(squared[both], 1).sum() + missed.sum() + outside[beside].sum() + FOREARM_COST * forearm.sum()
     union = both.sum() + missed.sum() + beside.sum()
-    assert (~covered & seen & forearm).any()
+    assert forearm.sum() > 3
     assert found == pytest.approx((total / union, both.sum() / union), rel=1e-5)
 
 

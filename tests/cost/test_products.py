@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spf.cost.problem import Problem
-from spf.cost.products import Sample, products, see
+from spf.cost.products import Sample, curvature, products, see
 from spf.errors import HandError
 from spf.hand.model import load_hand
 from tests.reference import cost as reference
@@ -22,7 +22,7 @@ ROTATIONS = {
 OFF = {"normal": 0.0, "background": 0.0, "coverage": 0.0, "collision": 0.0}
 TERMS = {
     "depth": {},
-    "depth, not robust": {"behind": np.inf, "front": np.inf, "pull": np.inf},
+    "depth, not robust": {"behind": 0.0, "front": 0.0, "pull": 0.0},
     "normal": {"normal": 3.0},
     "background": {"background": 0.7},
     "coverage": {"coverage": 3.0},
@@ -132,6 +132,18 @@ def test_gauss_newton_is_symmetric_and_positive_semidefinite(side: str, dofs: in
     np.testing.assert_allclose(hessian, hessian.T, atol=1e-11 * scale)
     assert np.linalg.eigvalsh(hessian).min() > -1e-11 * scale
     assert np.linalg.eigvalsh(hessian).max() > 0
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize(("side", "dofs"), [("right", 26), ("left", 30)])
+def test_diagonal_is_that_of_the_products(side: str, dofs: int, camera: str) -> None:
+    """The columns summed up the tree against products with the unit vectors."""
+    case = make_case(side, dofs, camera, "away")
+    by_products = [
+        products(case.problem, case.pose, unit, case.sample, precision=case.precision).product for unit in np.eye(dofs)
+    ]
+    found = curvature(case.problem, case.pose, case.sample, precision=case.precision)
+    np.testing.assert_allclose(found, np.diag(by_products), rtol=1e-9)
 
 
 def test_product_is_linear_in_the_direction(rng: np.random.Generator) -> None:

@@ -38,12 +38,12 @@ def square(squared: complex) -> complex:
     return squared
 
 
-def cauchy(scale: float) -> Loss:
-    return square if np.isinf(scale) else lambda squared: scale**2 * np.log1p(squared / scale**2)
+def cauchy(inverse: float) -> Loss:
+    return square if inverse == 0 else lambda squared: np.log1p(inverse * squared) / inverse
 
 
-def geman_mcclure(scale: float) -> Loss:
-    return square if np.isinf(scale) else lambda squared: squared / (1 + squared / scale**2)
+def geman_mcclure(inverse: float) -> Loss:
+    return lambda squared: squared / (1 + inverse * squared)
 
 
 def springs(problem: Problem, pose: Array, sample: Sample) -> list[Spring]:
@@ -87,17 +87,21 @@ def _to_point(problem: Problem, vertex: int, target: Array) -> Callable[[Array],
 
 def _collisions(problem: Problem, transforms: Array) -> list[Spring]:
     spheres, weights = problem.spheres, problem.weights
+    binds = problem.hand.skeleton.bind[spheres.bone]
     gain = weights.points * weights.collision / weights.length**2
 
+    in_model = [bind[:, :3] @ c + bind[:, 3] for bind, c in zip(binds, spheres.centre, strict=True)]
+
     def place(t: Array, q: int) -> Array:
-        return (t[spheres.bone[q]] @ [*spheres.centre[q], 1.0])[:3]
+        return (t[spheres.bone[q]] @ [*in_model[q], 1.0])[:3]
 
     def overlap(t: Array, a: int, b: int) -> Array:
         return np.array([spheres.radius[a] + spheres.radius[b] - np.linalg.norm(place(t, a) - place(t, b))])
 
     return [
         Spring(lambda t, a=a, b=b: overlap(t, a, b), square, gain)
-        for a, b in spheres.pairs.tolist()
+        for a, (first, last) in enumerate(spheres.partners.tolist())
+        for b in range(first, last)
         if gain > 0 and overlap(transforms, a, b)[0] > 0
     ]
 
