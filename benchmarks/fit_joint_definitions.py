@@ -47,11 +47,12 @@ def main(arguments: list[str] | None = None) -> None:
     """Fit the offsets, print what they leave of the error, and write them."""
     parser = argparse.ArgumentParser(description="Fit what a data set's joints mean on the model.")
     parser.add_argument("sources", nargs="+", metavar="SESSION|RUN", help="recordings of one data set, or runs on them")
+    parser.add_argument("--init", choices=("auto", "truth"), default="auto", help="where first poses come from (auto)")
     parser.add_argument("--seed", type=int, default=0, help="of the tracker")
     parser.add_argument("-o", "--output", type=Path, default=_STORED, help="file to write (spf/joint_definitions.json)")
     options = parser.parse_args(arguments)
     try:
-        tracked = [_tracked(Path(source), options.seed) for source in options.sources]
+        tracked = [_tracked(Path(source), options.seed, options.init) for source in options.sources]
     except SpfError as error:
         sys.exit(f"fit_joint_definitions: {error}")
     names = {item.session.joint_definition for item in tracked}
@@ -67,7 +68,7 @@ def main(arguments: list[str] | None = None) -> None:
         "recordings": [item.session.name for item in tracked],
         "frames": [int((~item.track.lost).sum()) for item in tracked],
         "how": "per joint, median over all held frames of truth minus model in the bone's frame, as a fraction of the "
-        f"hand's length; spf {__version__}, default tracker, seed {options.seed}",
+        f"hand's length; spf {__version__}, default tracker, start {options.init}, seed {options.seed}",
         "offsets": {name: np.round(row, 5).tolist() for name, row in zip(JOINT_NAMES, offsets, strict=True)},
     }
     content = {**definitions(), names.pop(): entry}
@@ -75,15 +76,15 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"Wrote {options.output}.")
 
 
-def _tracked(source: Path, seed: int) -> _Tracked:
+def _tracked(source: Path, seed: int, init: str) -> _Tracked:
     if (source / MANIFEST).exists():
         run = read_run(source)
         return _Tracked(reopen_session(run.manifest), run.plan.start.shape.hand(), run.track)
     session = open_session(source)
-    start = prepare(session, seed=seed)
+    start = prepare(session, init=init, seed=seed)
     if start.doubt:
         print(f"{session.name}: {start.doubt}", file=sys.stderr)
-    plan = Plan("spf", "default", make_settings("spf"), seed, "auto", 0, len(session), start)
+    plan = Plan("spf", "default", make_settings("spf"), seed, init, 0, len(session), start)
     hand = start.shape.hand()
     return _Tracked(session, hand, track_of([row_of(r) for r in track_plan(session, plan)], hand.dof_names))
 
