@@ -18,6 +18,7 @@ from app.views.errors import JointErrors
 from app.views.ess import EffectiveSamples
 from app.views.fit import Fit
 from app.views.messages import Messages
+from app.views.plots import BEFORE, heading
 from app.views.scenes import PICTURES
 from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
@@ -30,7 +31,7 @@ __all__ = ["page"]
 
 _TITLE = "Smart Particle Filter"
 _THEME = {"palette": {"primary": {"main": "#1f4e79"}}, "typography": {"fontSize": 13}}
-_PICTURE_HEIGHT, _PLOT_HEIGHT = 262, 168
+_PICTURE_HEIGHT, _PLOT_HEIGHT = 268, 196
 
 
 def page() -> pmu.Page:
@@ -70,26 +71,26 @@ def page() -> pmu.Page:
 def _grid(state: State, three_d: ThreeD) -> pmu.Column:
     """Three rows of three: the pictures; the depth image and this frame's particles; the plots over the frames."""
     depth = Depth(state)
-    truth = pmu.Switch.from_param(state.param.with_truth, label="Truth", size="small", margin=(0, 4), align="center")
-    pictures = [_framed(three_d.panes[name], heading, _PICTURE_HEIGHT) for name, heading in PICTURES.items()]
+    truth = pmu.Switch.from_param(
+        state.param.with_truth, label="Truth", description="", size="small", margin=(0, 4), align="center"
+    )
+    pictures = [_framed(three_d.panes[name], heading(title), _PICTURE_HEIGHT) for name, title in PICTURES.items()]
+    keys = ("●", "white", "estimate"), ("●", BEFORE, "truth")
     now = [
-        _framed(depth.pane, "Depth, with the estimate (white) and the truth (orange)", _PICTURE_HEIGHT, truth),
-        _framed(Costs(state).pane, "", _PICTURE_HEIGHT),
-        _framed(Weights(state).pane, "", _PICTURE_HEIGHT),
+        _framed(depth.pane, heading("Depth", *keys), _PICTURE_HEIGHT, truth),
+        *(_framed(plot.pane, plot.heading, _PICTURE_HEIGHT) for plot in (Costs(state), Weights(state))),
     ]
-    frames = [_framed(plot(state).pane, "", _PLOT_HEIGHT) for plot in (JointErrors, EffectiveSamples, Fit)]
+    over = (JointErrors(state), EffectiveSamples(state), Fit(state))
+    frames = [_framed(plot.pane, plot.heading, _PLOT_HEIGHT) for plot in over]
     rows = [pmu.Row(*row, sizing_mode="stretch_width", margin=0) for row in (pictures, now, frames)]
     return pmu.Column(*rows, sizing_mode="stretch_width", margin=(0, 6))
 
 
-def _framed(pane: Any, heading: str, height: int, *tools: Any) -> pmu.Paper:
+def _framed(pane: Any, head: Any, height: int, *tools: Any) -> pmu.Paper:
     """Return a pane in a card of a height, under a heading."""
-    head = pmu.Row(
-        pmu.Typography(heading, variant="subtitle2", margin=(2, 4), sizing_mode="stretch_width"), *tools,
-        sizing_mode="stretch_width", margin=0, height=26,
-    )  # fmt: skip
-    parts = [head, pane] if heading else [pane]
+    words = pn.pane.HTML(head, margin=(2, 4), sizing_mode="stretch_width") if isinstance(head, str) else head
     return pmu.Paper(
-        *parts, sizing_mode="stretch_width", height=height, margin=4, elevation=0, variant="outlined",
+        pmu.Row(words, *tools, sizing_mode="stretch_width", margin=0, height=28), pane,
+        sizing_mode="stretch_width", height=height, margin=4, elevation=0, variant="outlined",
         sx={"p": "4px", "overflow": "hidden"},
     )  # fmt: skip

@@ -6,11 +6,12 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool
 
 from app.state import State
-from app.views.plots import CALM, LOSS, FramePlot, calm_figure, small_legend
+from app.views.plots import CALM, LOSS, FramePlot, calm_figure, heading
 
 __all__ = ["JointErrors"]
 
 _TITLE = "Mean joint error"
+_LOST = ("▮", LOSS, "hand lost")
 
 
 class JointErrors(FramePlot):
@@ -19,24 +20,20 @@ class JointErrors(FramePlot):
     def __init__(self, state: State) -> None:
         self.source = ColumnDataSource({"frame": [], "error": []})
         self.lost = ColumnDataSource({"frame": [], "height": []})
-        plot = calm_figure(_TITLE, "frame", "error, mm", x_range=(-1, 120), y_range=(0, 20))
-        plot.vbar(
-            "frame", top="height", width=1, source=self.lost, color=LOSS, alpha=0.35, line_color=None, legend_label="lost"
-        )
+        plot = calm_figure("frame", "error, mm", x_range=(-1, 120), y_range=(0, 20))
+        plot.vbar("frame", top="height", width=1, source=self.lost, color=LOSS, alpha=0.35, line_color=None)
         line = plot.line("frame", "error", source=self.source, color=CALM, line_width=1.5)
         plot.scatter("frame", "error", source=self.source, color=CALM, size=3)
         hover = plot.select_one(HoverTool)
         hover.renderers, hover.mode = [line], "vline"
         hover.tooltips = [("frame", "@frame"), ("error", "@error{0.0} mm")]
-        small_legend(plot)
-        plot.legend.visible = False
-        super().__init__(state, plot)
+        super().__init__(state, plot, heading(_TITLE, _LOST))
 
     def draw_frames(self) -> None:
         """Show the frames tracked so far."""
         session, summaries = self.state.session, self.state.results.summaries
         no_truth = session is not None and not session.has_truth
-        self.figure.title.text = f"{_TITLE}: this session has no truth" if no_truth else _TITLE
+        self.heading.object = heading(f"{_TITLE}: no truth in this session" if no_truth else _TITLE, _LOST)
         errors = 1000 * np.array([s.error for s in summaries])
         self.source.data = {"frame": np.array([s.index for s in summaries]), "error": errors}
         known = errors[np.isfinite(errors)]
@@ -44,4 +41,3 @@ class JointErrors(FramePlot):
         self.figure.y_range.update(start=0, end=top)
         lost = [s.index for s in summaries if s.lost]
         self.lost.data = {"frame": lost, "height": [top] * len(lost)}
-        self.figure.legend.visible = bool(lost)

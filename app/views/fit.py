@@ -5,7 +5,7 @@ from __future__ import annotations
 from bokeh.models import ColumnDataSource, HoverTool
 
 from app.state import State
-from app.views.plots import AFTER, CALM, FramePlot, calm_figure, small_legend
+from app.views.plots import AFTER, CALM, FramePlot, calm_figure, heading
 
 __all__ = ["Fit"]
 
@@ -15,19 +15,19 @@ class Fit(FramePlot):
 
     def __init__(self, state: State) -> None:
         self.source = ColumnDataSource({"frame": [], "golden": [], "overlap": []})
-        plot = calm_figure("Render against depth", "frame", "share, 0 to 1", x_range=(-1, 120), y_range=(0, 1.3))
+        plot = calm_figure("frame", "share, 0 to 1", x_range=(-1, 120), y_range=(0, 1.05))
         lines = [
-            plot.line("frame", name, source=self.source, color=colour, line_width=2, line_dash=dash, legend_label=label)
-            for name, colour, dash, label in (
-                ("overlap", AFTER, "solid", "overlap of silhouettes"),
-                ("golden", CALM, "4 2", "golden energy (0 explains all)"),
+            plot.line("frame", name, source=self.source, color=colour, line_width=2, line_dash=dash)
+            for name, colour, dash in (
+                ("overlap", AFTER, "solid"),
+                ("golden", CALM, "4 2"),
             )
         ]
         hover = plot.select_one(HoverTool)
         hover.renderers, hover.mode = lines[:1], "vline"
         hover.tooltips = [("frame", "@frame"), ("overlap", "@overlap{0.00}"), ("golden", "@golden{0.00}")]
-        small_legend(plot)
-        super().__init__(state, plot)
+        keys = ("━", AFTER, "overlap"), ("┅", CALM, "golden energy")
+        super().__init__(state, plot, heading("Render against depth", *keys))
 
     def draw_frames(self) -> None:
         """Show the frames tracked so far."""

@@ -14,7 +14,7 @@ from spf.render.palette import OPTIMISED, PREDICTED, RESIDUAL
 
 from app.state import State
 
-__all__ = ["AFTER", "BEFORE", "CALM", "LOSS", "FramePlot", "Plot", "calm_figure", "css", "small_legend"]
+__all__ = ["AFTER", "BEFORE", "CALM", "LOSS", "FramePlot", "Plot", "calm_figure", "css", "heading"]
 
 _EVERY = 0.4  # s between two redraws while playing
 
@@ -28,13 +28,13 @@ def css(colour: tuple[float, float, float]) -> str:
 BEFORE, AFTER, CALM, LOSS = css(PREDICTED), css(OPTIMISED), "#44505c", css(RESIDUAL)
 
 
-def calm_figure(title: str, x_label: str, y_label: str, **options: Any) -> figure:
+def calm_figure(x_label: str, y_label: str, **options: Any) -> figure:
     """Return an empty figure in the page's style."""
     plot = figure(
-        title=title, x_axis_label=x_label, y_axis_label=y_label, sizing_mode="stretch_both", min_height=120,
-        tools="hover", toolbar_location=None, min_border_left=56, min_border_right=14, outline_line_color=None, **options,
+        x_axis_label=x_label, y_axis_label=y_label, sizing_mode="stretch_both", min_height=110,
+        tools="hover", toolbar_location=None, min_border_left=58, min_border_right=14, min_border_top=6,
+        outline_line_color=None, **options,
     )  # fmt: skip
-    plot.title.text_font_size, plot.title.text_font, plot.title.text_color = "13px", "Roboto, sans-serif", "#2a3038"
     for axis in plot.axis:
         axis.axis_label_text_font_style, axis.axis_label_text_font_size = "normal", "11px"
         axis.major_label_text_font_size, axis.axis_label_standoff = "10px", 4
@@ -44,19 +44,24 @@ def calm_figure(title: str, x_label: str, y_label: str, **options: Any) -> figur
     return plot
 
 
-def small_legend(plot: figure, location: str = "top_left") -> None:
-    """Put the legend of a figure into a corner, small, in one row."""
-    plot.legend.location, plot.legend.orientation = location, "horizontal"
-    plot.legend.label_text_font_size, plot.legend.glyph_width, plot.legend.spacing = "10px", 14, 8
-    plot.legend.padding, plot.legend.margin, plot.legend.glyph_height = 3, 4, 12
-    plot.legend.border_line_color, plot.legend.background_fill_alpha = None, 0.8
+def heading(title: str, *keys: tuple[str, str, str]) -> str:
+    """Return HTML that stands above a plot: its title and (sign, colour, meaning) of what is drawn in it."""
+    legend = "".join(
+        f" &nbsp;<span style='color:{colour};-webkit-text-stroke:0.4px #2a3038'>{sign}</span> {meaning}"
+        for sign, colour, meaning in keys
+    )
+    return (
+        "<div style='font:500 13px/24px Roboto,sans-serif;color:#2a3038;white-space:nowrap'>"
+        f"{title}<span style='font-weight:400;font-size:12px;color:#44505c'>{legend}</span></div>"
+    )
 
 
 class Plot(ABC):
-    """A pane that follows the state."""
+    """A pane that follows the state, under a heading."""
 
-    def __init__(self, state: State, plot: figure) -> None:
+    def __init__(self, state: State, plot: figure, title: str) -> None:
         self.state, self.figure = state, plot
+        self.heading = pn.pane.HTML(title, margin=(2, 4), sizing_mode="stretch_width")
         self.pane = pn.pane.Bokeh(plot, sizing_mode="stretch_both", margin=0)
         self._drawn = 0.0
         state.param.watch(self._follow, ["revision", "playing"])
@@ -80,8 +85,8 @@ class Plot(ABC):
 class FramePlot(Plot):
     """A plot over the frames of the session, with a line at the one shown."""
 
-    def __init__(self, state: State, plot: figure) -> None:
-        super().__init__(state, plot)
+    def __init__(self, state: State, plot: figure, title: str) -> None:
+        super().__init__(state, plot, title)
         self._here = Span(location=0, dimension="height", line_color="#9aa4ae", line_width=1)
         plot.add_layout(self._here)
 

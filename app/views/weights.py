@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, LinearAxis, Range1d
 
 from app.state import State
-from app.views.plots import AFTER, BEFORE, CALM, Plot, calm_figure, small_legend
+from app.views.plots import AFTER, BEFORE, CALM, Plot, calm_figure, heading
 
 __all__ = ["Weights"]
 
@@ -20,11 +20,9 @@ class Weights(Plot):
 
     def __init__(self, state: State) -> None:
         self.source = ColumnDataSource({name: [] for name in _COLUMNS})
-        plot = calm_figure(
-            "Weight and correction factor of each sample", "particle", "weight, %", y_range=(0, 100), x_range=(0.4, 4.6)
-        )
+        plot = calm_figure("particle", "weight, %", y_range=(0, 100), x_range=(0.4, 4.6))
         bars = [
-            plot.vbar(x, top=name, width=0.36, source=self.source, color=colour, legend_label=name)
+            plot.vbar(x, top=name, width=0.36, source=self.source, color=colour)
             for x, name, colour in (("left", "predicted", BEFORE), ("right", "optimised", AFTER))
         ]
         plot.extra_y_ranges = {"correction": Range1d(-1, 1)}
@@ -36,7 +34,7 @@ class Weights(Plot):
         for x, name in (("left", "correction_left"), ("right", "correction_right")):
             plot.scatter(
                 x, name, source=self.source, y_range_name="correction", marker="diamond", size=9, color=CALM,
-                line_color="white", legend_label="correction c",
+                line_color="white",
             )  # fmt: skip
         hover = plot.select_one(HoverTool)
         hover.renderers = bars
@@ -44,9 +42,9 @@ class Weights(Plot):
             ("particle", "@particle"), ("predicted", "@predicted{0.0} %"), ("optimised", "@optimised{0.0} %"),
             ("log₁₀ c", "@correction_left{0.0}, @correction_right{0.0}"),
         ]  # fmt: skip
-        small_legend(plot)
         plot.xaxis.ticker.min_interval = 1
-        super().__init__(state, plot)
+        keys = ("■", BEFORE, "predicted"), ("■", AFTER, "optimised"), ("◆", CALM, "correction c")
+        super().__init__(state, plot, heading("Weights", *keys))
 
     def draw(self) -> None:
         """Show the samples of the frame shown."""
@@ -59,9 +57,8 @@ class Weights(Plot):
         particle = np.arange(1, len(before) + 1)
         columns = (particle, particle - 0.2, particle + 0.2, before, after, left, right)
         self.source.data = dict(zip(_COLUMNS, columns, strict=True))
-        # room above for the legend
-        self.figure.y_range.update(start=0, end=1.35 * float(max(before.max(), after.max())))
+        self.figure.y_range.update(start=0, end=1.1 * float(max(before.max(), after.max())))
         self.figure.x_range.update(start=0.4, end=len(before) + 0.6)
         low, high = float(min(left.min(), right.min(), 0.0)), float(max(left.max(), right.max(), 0.0))
         room = max(high - low, 1.0)
-        self.figure.extra_y_ranges["correction"].update(start=low - 0.1 * room, end=high + 0.4 * room)
+        self.figure.extra_y_ranges["correction"].update(start=low - 0.1 * room, end=high + 0.1 * room)
