@@ -69,7 +69,7 @@ def _trajectories(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scen
 
 
 def view_of(entry: Entry, azimuth: float, elevation: float, zoom: float) -> ViewCamera:
-    """Return the sensor's view of the observed hand, orbited by angles in radians and magnified."""
-    assert entry.result.observation is not None
-    view = ViewCamera.from_sensor(entry.result.observation.hand_points)
-    return view._replace(azimuth=azimuth, elevation=elevation, zoom=zoom)
+    """Return the sensor's view of the estimated hand, orbited by angles in radians and magnified."""
+    view = ViewCamera.from_sensor(entry.result.joints)
+    # The skin reaches beyond the joints, and the particles beyond the estimate.
+    return view._replace(extent=1.25 * view.extent, azimuth=azimuth, elevation=elevation, zoom=zoom)
