@@ -19,7 +19,7 @@ SAMPLES: dict[str, SyntheticSettings] = {
         motion="open_close", sensor="senz3d", clutter="forearm", side="right", speed_mm=9.0, frames=120, seed=1
     ),
     "fast-wave": SyntheticSettings(
-        motion="wave", sensor="senz3d", clutter="forearm", side="right", speed_mm=22.0, frames=120, seed=2
+        motion="wave", sensor="senz3d", clutter="forearm", side="right", speed_mm=40.0, frames=120, seed=4
     ),
     "turn-and-bend-left": SyntheticSettings(
         motion="turn_and_bend", sensor="kinect2", clutter="body", side="left", speed_mm=9.0, frames=90, seed=3

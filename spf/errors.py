@@ -4,6 +4,7 @@ __all__ = [
     "HandError",
     "RenderError",
     "RenderUnavailableError",
+    "RunError",
     "SessionError",
     "SettingError",
     "SpfError",
@@ -29,6 +30,10 @@ class HandError(SpfError):
 
 class StartError(SpfError):
     """No believable first pose could be found."""
+
+
+class RunError(SpfError):
+    """A run directory (track and manifest) cannot be written, read or repeated."""
 
 
 class RenderError(SpfError):

@@ -35,7 +35,9 @@ Progress = Callable[[str, float], None]
 
 DOUBTFUL = 0.42  # mean golden energy over the validation above which a start is not believed
 _SIDES: tuple[Side, Side] = ("right", "left")
-_VALIDATION_FRAMES = 12
+_CONVINCING = 0.30  # mean golden energy that ends the search at once …
+_CLEAR_MARGIN = 0.04  # … when the other side is this much worse
+_VALIDATION_FRAMES = 16
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
 _PER_SIDE = 4
@@ -84,6 +86,17 @@ class _Hypothesis(NamedTuple):
     energy: float
 
 
+class _Followed(NamedTuple):
+    """A hypothesis that was tracked for some frames: its first frame, mean golden energy, lead over the other side."""
+
+    frame: int
+    shape: HandShape
+    pose: Array
+    reference: Array
+    energy: float
+    margin: float
+
+
 def reach_of(hand: Hand) -> float:
     """Radius (m) around the palm's centre that holds the hand and some of the arm."""
     return 0.85 * hand.length + 0.02
@@ -111,28 +124,79 @@ def find_start(
     """
     report = progress or (lambda _text, _share: None)
     sides = (shape.side,) if shape else (side,) if side else _SIDES
-    for index in range(len(frames)):
-        report("Looking for a hand", index / len(frames))
+    best: _Followed | None = None
+    first = None
+    for attempt, index in enumerate(_instants(frames)):
+        report("Looking for a hand", 0.15 * attempt)
         hypotheses = _hypotheses(frames[index], sides, shape, rng)
-        if hypotheses:
+        if not hypotheses:
+            continue
+        first = index if first is None else first
+        report("Following the hypotheses", 0.15 * attempt + 0.1)
+        followed = _best_followed(frames, index, hypotheses, shape, rng)
+        if best is None or followed.energy < best.energy:
+            best = followed
+        if best.energy < _CONVINCING and best.margin > _CLEAR_MARGIN:
             break
-    else:
-        raise StartError(
-            "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
-        )
-    report("Following the hypotheses", 0.2)
-    ahead = list(frames[index : index + _VALIDATION_FRAMES])
-    energies = np.array([_follow(h, ahead, rng) for h in hypotheses])
-    best = int(np.argmin(energies))
-    others = [e for h, e in zip(hypotheses, energies, strict=True) if h.shape.side != hypotheses[best].shape.side]
-    margin = float(min(others) - energies[best]) if others else 1.0
-    chosen = hypotheses[best]
+    if best is None or first is None:
+        raise StartError("No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'.")
     if shape is None:
-        chosen, energy = _calibrated(frames[index : index + _CALIBRATION_FRAMES], chosen, rng, report)
-    else:
-        energy = float(energies[best])
-    reference = np.eye(3)
-    return Start(index, chosen.pose, reference, chosen.shape, min(energy, float(energies[best])), margin)
+        best = _calibrated(frames, best, rng, report)
+    index, pose, reference = _back_to(frames, first, best, rng)
+    report("Ready", 1.0)
+    return Start(index, pose, reference, best.shape, best.energy, best.margin)
+
+
+def _instants(frames: Sequence[Frame]) -> list[int]:
+    """Frames to look for a hand in: some of the first second, then farther and farther apart until one shows a hand."""
+    instants = [index for index in (0, 10, 20, 30) if index < len(frames)]
+    far = 45
+    while far < len(frames):
+        instants.append(far)
+        far = far * 3 // 2
+    return instants
+
+
+def _best_followed(
+    frames: Sequence[Frame],
+    index: int,
+    hypotheses: list[_Hypothesis],
+    shape: HandShape | None,
+    rng: np.random.Generator,
+) -> _Followed:
+    """Track every hypothesis for some frames, at a size fitted to them, and return the one that explains them best."""
+    ahead = frames[index : index + _VALIDATION_FRAMES]
+    rated: list[tuple[float, _Hypothesis]] = []
+    for hypothesis in hypotheses:
+        fitted = hypothesis
+        if shape is None:
+            tracked = _track(hypothesis, ahead[: _VALIDATION_FRAMES // 2], rng)
+            views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::2]]
+            if not views:
+                continue
+            sized, views, _ = fit_shape(views, hypothesis.shape, rng, iterations=4, refine=False)
+            fitted = _Hypothesis(sized, _relative_to_camera(views[0]), hypothesis.energy)
+        infos = _track(fitted, ahead, rng)
+        energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
+        rated.append((energy + 0.5 * (len(ahead) - len(infos)) / len(ahead), fitted))
+    rated.sort(key=lambda item: item[0])
+    energy, chosen = rated[0]
+    others = [e for e, h in rated if h.shape.side != chosen.shape.side]
+    return _Followed(index, chosen.shape, chosen.pose, np.eye(3), energy, min(others) - energy if others else 1.0)
+
+
+def _back_to(
+    frames: Sequence[Frame], first: int, start: _Followed, rng: np.random.Generator
+) -> tuple[int, Array, Array]:
+    """Track backwards from where the start was found to the first frame with a hand: (frame, pose, reference)."""
+    if start.frame == first:
+        return first, start.pose, start.reference
+    backwards = [frames[index]._replace(time=-frames[index].time) for index in range(start.frame, first - 1, -1)]
+    tracked = _track(_Hypothesis(start.shape, start.pose, start.energy), backwards, rng, start.reference)
+    if len(tracked) < len(backwards) or tracked[-1][2].estimate_golden > 1.5 * start.energy + 0.1:
+        return start.frame, start.pose, start.reference
+    state = tracked[-1][1]
+    return first, state.estimate, state.reference
 
 
 def _hypotheses(
@@ -172,7 +236,7 @@ def locate(
         distinct = _spaced(hand, found, _POLISHED)
         polished = _polish(problem, cost, found.poses[distinct], found.scales[distinct], rng)
         poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
-        found = refine(problem, poses, scales, settings._replace(generations=6), rng)
+        found = refine(problem, poses, scales, settings, rng)
     return sorted(polished, key=lambda item: item[2])
 
 
@@ -217,7 +281,7 @@ def recover(frame: Frame, hand: Hand, usual: float, rng: np.random.Generator) ->
     Returns:
         Its pose (D,) relative to the camera's axes, or None when nothing explains the depth well enough.
     """
-    settings = SearchSettings(islands=4, population=800, survivors=40, generations=12, scale_spread=0.0)
+    settings = SearchSettings(islands=10, kept=4, generations=25, scale_spread=0.0)
     for region in find_regions(frame)[:2]:
         observation = observe(frame, region.centre, region.radius)
         if observation.is_empty:
@@ -241,18 +305,14 @@ def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:
     return kept
 
 
-def _follow(hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator) -> float:
-    """Mean golden energy of a hypothesis that is tracked over some frames."""
-    states = _track(hypothesis, frames, rng)
-    return float(np.mean([info.estimate_golden for _, _, info in states]))
-
-
 def _track(
-    hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator
+    hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator, reference: Array | None = None
 ) -> list[tuple[Observation, smart.State, smart.StepInfo]]:
+    """Track a hypothesis with the default filter, until nothing is seen any more."""
     hand, settings = hypothesis.shape.hand(), smart.SpfSettings()
     spheres = digit_spheres(hand)
-    state = smart.start(hand, hypothesis.pose, np.eye(3), frames[0].time - 1 / 30, settings.n)
+    axes = np.eye(3) if reference is None else reference
+    state = smart.start(hand, hypothesis.pose, axes, frames[0].time - 1 / 30, settings.n)
     result = []
     for frame in frames:
         observation = observe(frame, state.estimate[:3], reach_of(hand))
@@ -263,19 +323,18 @@ def _track(
     return result
 
 
-def _calibrated(
-    frames: Sequence[Frame], hypothesis: _Hypothesis, rng: np.random.Generator, report: Progress
-) -> tuple[_Hypothesis, float]:
-    """Fit the shape to what the hypothesis tracks, its size first, and take the first frame's pose along."""
-    shape, pose, energy = hypothesis.shape, hypothesis.pose, hypothesis.energy
-    for turn, refine in enumerate((False, True)):
-        report("Calibrating the hand", 0.4 + 0.3 * turn)
-        tracked = _track(_Hypothesis(shape, pose, energy), frames, rng)
+def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator, report: Progress) -> _Followed:
+    """Fit the shape to what the start tracks, its size first, and take the pose along."""
+    ahead = frames[start.frame : start.frame + _CALIBRATION_FRAMES]
+    shape, pose, energy = start.shape, start.pose, start.energy
+    for turn, refine_all in enumerate((False, True)):
+        report("Calibrating the hand", 0.7 + 0.15 * turn)
+        tracked = _track(_Hypothesis(shape, pose, energy), ahead, rng)
         every = max(1, len(tracked) // _VIEWS)
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
-        shape, views, energy = fit_shape(views, shape, rng, iterations=8, refine=refine)
+        shape, views, energy = fit_shape(views, shape, rng, iterations=8, refine=refine_all)
         pose = _relative_to_camera(views[0])
-    return _Hypothesis(shape, pose, energy), energy
+    return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy))
 
 
 def _relative_to_camera(view: View) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from spf.calibrate import View, fit_shape
 from spf.cost.problem import golden, make_problem
 from spf.cost.settings import CostSettings
 from spf.errors import HandError, StartError
@@ -28,6 +29,7 @@ __all__ = ["SessionFrames", "fit_pose", "prepare"]
 Array = NDArray[np.float64]
 _KEPT = 64  # decoded frames that are kept: what one start looks at
 _PALM = np.array([0, 1, 5, 9, 13, 17])  # joints that move with the palm, more or less
+_CALIBRATED, _VIEWS = 48, 12  # frames that a hand is calibrated on, and how many of them are looked at
 _REST = 0.001  # m per radian: how strongly a fit prefers the bind pose where the joints say nothing
 
 
@@ -104,7 +106,7 @@ def prepare(
         start = find_start(frames, rng, side=session.side, shape=shape, progress=progress)
         return start._replace(frame=first + start.frame)
     if init == "truth":
-        return _from_truth(session, frames, shape, rng, progress)
+        return _from_truth(session, frames, shape, rng)
     return _from_file(session, frames, Path(init), shape, rng, progress)
 
 
@@ -136,7 +138,6 @@ def _from_truth(
     frames: SessionFrames,
     shape: HandShape | None,
     rng: np.random.Generator,
-    progress: Progress | None,
 ) -> Start:
     """Take the exact pose where the truth has one and the hand is the exact one, else fit a pose to the true joints."""
     if not session.has_truth:
@@ -152,10 +153,25 @@ def _from_truth(
         orientation = np.eye(3) if truth.orientation is None else truth.orientation
         return _judged(frame, exact, truth.pose, orientation, rng)
     if shape is None:
-        side = session.side or _side_of(truth.joints)
-        shape = find_start(frames[position:], rng, side=side, progress=progress).shape
+        shape = _calibrated(session.side or _side_of(truth.joints), frames[position : position + _CALIBRATED], rng)
     pose, reference = fit_pose(shape.hand(), truth.joints)
     return _judged(frame, shape, pose, reference, rng)
+
+
+def _calibrated(side: Side, frames: SessionFrames, rng: np.random.Generator) -> HandShape:
+    """Calibrate a hand from the depth of frames whose true joints give its poses."""
+    truth = frames[0].truth
+    assert truth is not None
+    shape = HandShape(side, scale=_size_ratio(load_hand(side), truth.joints))
+    for refined in (False, True):
+        hand = shape.hand()
+        views = []
+        for frame in (frames[i] for i in range(0, len(frames), _CALIBRATED // _VIEWS)):
+            if frame.truth is not None:
+                pose, reference = fit_pose(hand, frame.truth.joints)
+                views.append(View(observe(frame, pose[:3], reach_of(hand)), pose, reference))
+        shape = fit_shape([view for view in views if not view.observation.is_empty], shape, rng, refine=refined)[0]
+    return shape
 
 
 def _judged(frame: Frame, shape: HandShape, pose: Array, reference: Array, rng: np.random.Generator) -> Start:
@@ -220,15 +236,20 @@ def _known(joints: Array) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(joints).all(axis=1))
 
 
+def _size_ratio(hand: Hand, joints: Array) -> float:
+    """How much larger than a hand's palm that of the given joints (21, 3) is."""
+    palm = _PALM[_known(joints)[_PALM]]
+    own = joints_of(hand, hand.neutral_pose())[palm]
+    return float(np.linalg.norm(joints[palm].std(axis=0)) / np.linalg.norm(own.std(axis=0)))
+
+
 def _side_of(joints: Array) -> Side:
     """Side of the hand whose joints (21, 3) are given: the one that they are fitted by more closely."""
     known = _known(joints)
-    palm = _PALM[known[_PALM]]
 
     def misfit(side: Side) -> float:
         bind = load_hand(side)
-        own = joints_of(bind, bind.neutral_pose())[palm]
-        hand = bind.scaled(float(np.linalg.norm(joints[palm].std(axis=0)) / np.linalg.norm(own.std(axis=0))))
+        hand = bind.scaled(_size_ratio(bind, joints))
         pose, reference = fit_pose(hand, joints)
         return float(np.linalg.norm((joints_of(hand, pose, reference) - joints)[known]))
 

@@ -28,16 +28,19 @@ class SearchSettings(NamedTuple):
 
     Attributes:
         islands: independent populations, searched in parallel: what one misses another finds.
+        kept: how many of them, the best after some generations, are evolved to the end.
         population: hypotheses in an island's first generation.
-        survivors: how many are kept.
-        generations: number of generations after the first.
+        survivors: how many are kept from generation to generation.
+        scouting, generations: generations of all islands, and then of those that are kept.
         scale_mean, scale_spread: prior of the hand's scale, mean and standard deviation of its logarithm; 0 fixes it.
     """
 
-    islands: int = 6
-    population: int = 1500
-    survivors: int = 60
-    generations: int = 16
+    islands: int = 24
+    kept: int = 8
+    population: int = 800
+    survivors: int = 24
+    scouting: int = 14
+    generations: int = 45
     scale_mean: float = 1.0
     scale_spread: float = 0.15
 
@@ -76,11 +79,18 @@ def search(problem: Problem, places: Array, settings: SearchSettings, rng: np.ra
         The survivors of all islands.
     """
 
-    def island(stream: np.random.Generator) -> tuple[_Genes, Array]:
+    def scout(stream: np.random.Generator) -> tuple[_Genes, Array]:
         genes = _random_genes(problem.hand, places, settings, stream)
-        return _evolve(problem, genes, settings, stream, 1.0)
+        return _evolve(problem, genes, settings, stream, (1.0, 0.5), settings.scouting)
 
-    return _merge(map_threads(island, rng.spawn(settings.islands)))
+    def settle(item: tuple[_Genes, np.random.Generator]) -> tuple[_Genes, Array]:
+        genes, stream = item
+        return _evolve(problem, genes, settings, stream, (0.5, 0.03), settings.generations)
+
+    scouted = map_threads(scout, rng.spawn(settings.islands))
+    scouted.sort(key=lambda island: float(island[1][0]))
+    kept = [genes for genes, _ in scouted[: settings.kept]]
+    return _merge(map_threads(settle, zip(kept, rng.spawn(len(kept)), strict=True)))
 
 
 def refine(
@@ -90,20 +100,25 @@ def refine(
     genes = _Genes(poses[:, :3], Rotation.from_euler("XYZ", poses[:, 3:6]).as_quat(), poses[:, 6:], scales)
 
     def island(stream: np.random.Generator) -> tuple[_Genes, Array]:
-        return _evolve(problem, genes, settings, stream, 0.35)
+        return _evolve(problem, genes, settings, stream, (0.35, 0.03), settings.scouting)
 
-    return _merge(map_threads(island, rng.spawn(max(1, settings.islands // 3))))
+    return _merge(map_threads(island, rng.spawn(2)))
 
 
 def _evolve(
-    problem: Problem, genes: _Genes, settings: SearchSettings, rng: np.random.Generator, spread: float
+    problem: Problem,
+    genes: _Genes,
+    settings: SearchSettings,
+    rng: np.random.Generator,
+    spread: tuple[float, float],
+    generations: int,
 ) -> tuple[_Genes, Array]:
-    """Evolve a population; ``spread`` is the size of the first perturbations. Returns the survivors, best first."""
+    """Evolve a population, perturbations shrinking between two sizes; returns the survivors, best first."""
     energies = _judge(problem, genes, settings)
-    for generation in range(settings.generations):
+    for generation in range(generations):
         best = np.argsort(energies)[: settings.survivors]
         parents, parent_energies = _take(genes, best), energies[best]
-        shrink = spread * 0.82**generation
+        shrink = spread[0] * (spread[1] / spread[0]) ** (generation / generations)
         children = _offspring(problem.hand, parents, 4 * settings.survivors, shrink, settings, rng)
         genes = _Genes(*(np.concatenate(pair) for pair in zip(parents, children, strict=True)))
         energies = np.concatenate([parent_energies, _judge(problem, children, settings)])
@@ -177,18 +192,23 @@ def _offspring(
     for columns in digit_columns(hand):
         swap = rng.random(count) < 0.25
         digits[np.ix_(swap, columns)] = parents.digits[np.ix_(second[swap], columns)]
-    fan = np.where(rng.random(count) < 0.25, rng.normal(scale=0.3, size=count), 0.0)
+    # each child changes in some of its parts only: a change of all at once is seldom for the better
+    fan = np.where(rng.random(count) < 0.15, rng.normal(scale=0.3, size=count), 0.0)
     for finger in range(4):
         digits[:, 4 + 4 * finger] += _SPREAD[finger] * fan
-    touched = rng.random(digits.shape) < 0.3
-    digits += touched * rng.normal(scale=0.15 + 0.5 * shrink, size=digits.shape)
+    for columns in digit_columns(hand):
+        touched = rng.random(count) < 0.3
+        digits[np.ix_(touched, columns)] += rng.normal(scale=0.08 + 0.5 * shrink, size=(int(touched.sum()), len(columns)))
     turns = _shift_fingers(hand, digits, parents.turns[first], rng)
-    turn = Rotation.from_rotvec(rng.normal(scale=0.03 + 0.4 * shrink, size=(count, 3)))
+    turned = rng.random((count, 1)) < 0.5
+    turn = Rotation.from_rotvec(turned * rng.normal(scale=0.03 + 0.4 * shrink, size=(count, 3)))
     turns = (turn * Rotation.from_quat(turns)).as_quat()
-    places = parents.places[first] + rng.normal(scale=0.002 + 0.015 * shrink, size=(count, 3))
+    moved = rng.random((count, 1)) < 0.5
+    places = parents.places[first] + moved * rng.normal(scale=0.002 + 0.015 * shrink, size=(count, 3))
     scales = parents.scales[first]
     if settings.scale_spread > 0:
-        scales = scales * np.exp(rng.normal(scale=0.01 + 0.06 * shrink, size=count))
+        resized = rng.random(count) < 0.4
+        scales = scales * np.exp(resized * rng.normal(scale=0.01 + 0.06 * shrink, size=count))
         low = settings.scale_mean * np.exp(-3 * settings.scale_spread)
         scales = np.clip(scales, low, settings.scale_mean**2 / low)
     return _Genes(places, turns, np.clip(digits, hand.limits[6:, 0], hand.limits[6:, 1]), scales)

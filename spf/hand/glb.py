@@ -59,7 +59,7 @@ def read_glb(path: str | Path) -> SkinnedMesh:
     weights = np.zeros((len(positions), len(names)))
     np.add.at(weights, (np.arange(len(positions))[:, None], joints), joint_weights)
     weights /= weights.sum(axis=1, keepdims=True)
-    bind = np.linalg.inv(inverse_bind.reshape(-1, 4, 4).transpose(0, 2, 1))
+    bind = np.linalg.inv(inverse_bind.reshape(-1, 4, 4).transpose(0, 2, 1)).astype(np.float64)
     return _weld(SkinnedMesh(positions, faces, weights, names, bind))
 
 

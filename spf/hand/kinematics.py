@@ -97,7 +97,7 @@ def rotation_about(angles: ArrayLike) -> Array:
 
 
 def angles_of(rotation: Array) -> Array:
-    """Return the three palm angles (a, b, c) with Rx(a) Ry(b) Rz(c) = rotation (3, 3), the inverse of :func:`rotation_about`."""
+    """Return the palm angles (a, b, c) with Rx(a) Ry(b) Rz(c) = rotation (3, 3); inverts :func:`rotation_about`."""
     b = np.arcsin(min(max(rotation[0, 2], -1.0), 1.0))
     a = np.arctan2(-rotation[1, 2], rotation[2, 2])
     c = np.arctan2(-rotation[0, 1], rotation[0, 0])

@@ -38,8 +38,9 @@ Side = Literal["left", "right"]
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
 #: Bones, parents first: the palm and three a digit.
-BONES: tuple[str, ...] = ("palm", "thumb_metacarpal", "thumb_proximal", "thumb_distal") + tuple(
-    f"{finger}_{bone}" for finger in FINGERS[1:] for bone in ("proximal", "intermediate", "distal")
+BONES: tuple[str, ...] = (
+    *("palm", "thumb_metacarpal", "thumb_proximal", "thumb_distal"),
+    *(f"{finger}_{bone}" for finger in FINGERS[1:] for bone in ("proximal", "intermediate", "distal")),
 )
 
 DOF_NAMES: tuple[str, ...] = (

@@ -56,7 +56,7 @@ class HandShape(NamedTuple):
         Raises:
             HandError: a value is missing or out of range.
         """
-        if not isinstance(content, dict) or content.get("format") != _FORMAT:
+        if not isinstance(content, dict) or content.get("format") != _FORMAT or "side" not in content:
             raise HandError(f"{source} is not a hand shape; make one with 'spf calibrate SESSION -o HAND.json'.")
         try:
             values = {name: content[name] for name in cls._fields if name in content}

@@ -28,7 +28,7 @@ FAR = np.float32(1e9)  # depth of a pixel that nothing covers
 
 #: Labels of the pixels of an observation.
 EMPTY, HAND, UNKNOWN = 0, 1, 2
-FOREARM_RADIUS = 0.05  # m, of an adult's arm with its sleeve
+FOREARM_RADIUS = 0.044  # m, of an adult's arm
 FOREARM_COST = 0.1
 
 

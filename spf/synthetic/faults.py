@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spf.frame import Camera
 from spf.hand.kinematics import PosedHand
 from spf.hand.model import BONES, Hand
-from spf.kernels.render import project_vertices, rasterise
+from spf.kernels.render import FAR, project_vertices, rasterise
 from spf.synthetic.solids import camera_numbers
 
 __all__ = ["Fault", "apply_fault", "draw_fault"]
@@ -78,7 +78,7 @@ def _visible_part(
     project_vertices(posed.vertices, camera_numbers(camera), projected)
     drawn = np.empty_like(depth)
     rasterise(projected, np.ascontiguousarray(part), drawn)
-    seen = np.abs(drawn - depth) < _SAME_SURFACE
+    seen = (drawn < FAR) & (np.abs(drawn - depth) < _SAME_SURFACE)
     root = camera.project(posed.frames[bones[0], :, 3])
     tip = camera.project(posed.frames[bones[-1], :, 3])
     along = tip - root

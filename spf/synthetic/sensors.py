@@ -5,7 +5,9 @@ and counts. Noise is Gaussian with the standard deviation
 
     σ(z) = floor + quadratic · z²
 
-of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it.
+of which a part is grainy (correlated over a few pixels), as a sensor's own filter leaves it. On captured hands the
+residual of a local fit is 1.3 mm (Kinect v2) and 1.5 mm (Senz3D), and neighbours are correlated by 0.6 and 0.2; of the
+models it is 1.4 and 2.1 mm.
 """
 
 from __future__ import annotations
@@ -88,7 +90,7 @@ SENSORS: dict[str, Sensor] = {
         near=0.45,
         far=4.5,
         distance=0.65,
-        noise_floor=0.0010,
+        noise_floor=0.0014,
         noise_quadratic=0.0012,
         grain=3,
         grainy=0.9,
@@ -248,7 +250,7 @@ def _shadowed(sensor: Sensor, z: Image) -> Image:
     seen_at = columns - disparity  # column in the right eye; a nearer surface further right may already cover it
     after = np.minimum.accumulate(np.where(z > 0.0, seen_at, np.inf)[:, ::-1], axis=1)[:, ::-1]
     covered = np.zeros(z.shape, dtype=bool)
-    covered[:, :-1] = after[:, 1:] < seen_at[:, :-1] - 1.0
+    covered[:, :-1] = after[:, 1:] < seen_at[:, :-1]
     return np.where(covered, np.float32(0.0), z)
 
 

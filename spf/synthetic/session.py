@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from spf.errors import SettingError
 from spf.frame import Truth
 from spf.hand.kinematics import joints_of, pose_hand
-from spf.hand.model import Hand
+from spf.hand.model import Hand, mirrored
 from spf.hand.shape import HandShape
 from spf.kernels.render import FAR
 from spf.sessions import Session
@@ -41,7 +41,7 @@ class SyntheticSettings(Settings):
     frames: int = setting(120, "number of frames", group="motion", low=1, high=100_000)
     speed_mm: float = setting(
         9.0, "mean motion of the joints from frame to frame (4 slow, 9 medium, 16 fast), mm",
-        group="motion", low=0.5, high=40.0, unit="mm",
+        group="motion", low=0.5, high=60.0, unit="mm",
     )  # fmt: skip
     seed: int = setting(0, "seed of everything random", group="motion", low=0, high=2**31 - 1)
     absent_from: int = setting(0, "first frame without the hand", group="motion", low=0, high=100_000)
@@ -176,7 +176,7 @@ def _stage(settings: SyntheticSettings, shape: HandShape) -> _Stage:
     hand = shape.hand()
     rng = np.random.default_rng([settings.seed, 1])
     view = _view(settings, sensor, rng)
-    mover = hand if shape.side == "right" else shape._replace(side="right").hand()
+    mover = hand if shape.side == "right" else mirrored(hand)  # motions are written for a right hand
     trajectory = make_trajectory(
         mover, MOTIONS[settings.motion], view, settings.frames, settings.speed_mm, sensor.fps, rng
     )

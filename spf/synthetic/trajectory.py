@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 PALM_TO_SENSOR: Array = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 _LAG = 0.12  # largest fraction of a move by which a finger starts late
-_TREMOR_ANGLE = np.radians(0.15)
-_TREMOR_SHIFT = 0.0002  # m
+_TREMOR_ANGLE = np.radians(0.06)  # a joint's; about 0.2 mm at a fingertip
+_TREMOR_SHIFT = 0.0001  # m
 _SWAY_SHIFT = np.array([0.022, 0.014, 0.016])  # m
 _SWAY_TURN = np.radians([6.0, 6.0, 5.0])
 _MAX_ROUNDS = 12

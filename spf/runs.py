@@ -1,0 +1,169 @@
+"""Runs: plan one, track it frame by frame, keep it in a directory (track and manifest), and repeat it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+from spf.errors import RunError
+from spf.hand.kinematics import joints_of
+from spf.manifest import Plan, plan_of, read_manifest, write_manifest
+from spf.sessions import Session, open_session
+from spf.track import TrackedFrame, begin, run
+from spf.trackfile import Track, TrackRow, read_track, row_of, track_of, write_track
+
+__all__ = ["Run", "RunWriter", "check_same_session", "read_run", "reopen_session", "track_plan"]
+
+MANIFEST, TRACK = "manifest.json", "track.parquet"
+_SAVED_EVERY = 200  # frames that a killed program loses at most
+_FRAME = 1.0 / 30.0  # s before the first frame at which its pose is taken to hold
+
+
+class Run(NamedTuple):
+    """A run that was kept.
+
+    Attributes:
+        manifest: as it was written.
+        plan: to repeat it.
+        track: what it found.
+    """
+
+    manifest: dict[str, Any]
+    plan: Plan
+    track: Track
+
+
+def track_plan(session: Session, plan: Plan) -> Iterator[TrackedFrame]:
+    """Track the frames of a plan, lazily: stop asking and nothing more is computed.
+
+    Frames before the first pose's are reported as lost, with that pose: no hand was believed in them.
+
+    Raises:
+        SessionError: a frame cannot be read.
+    """
+    tracking, state = begin(plan.tracker, plan.settings, plan.start, plan.seed)
+    began = float(session.times[plan.start.frame]) - _FRAME
+    state = state._replace(filter=state.filter._replace(time=began))
+    joints = joints_of(tracking.hand, plan.start.pose, plan.start.reference)
+    nan = float("nan")
+    for index in range(plan.first, plan.start.frame):
+        yield TrackedFrame(
+            index, float(session.times[index]), plan.start.pose, plan.start.reference, joints, True, False,
+            nan, nan, nan, nan, 0.0, {}, None, None,
+        )  # fmt: skip
+    yield from run(tracking, state, (session[index] for index in range(plan.start.frame, plan.last)))
+
+
+class RunWriter:
+    """Keeps a run in a directory while it is tracked; what was tracked when it ends, however it ends, is kept.
+
+    Args:
+        directory: to write to; made if it is not there.
+        manifest: of the run; ``complete`` and ``frames_tracked`` are set by the writer.
+        dof_names: of the poses.
+        overwrite: replace a run that is there.
+
+    Raises:
+        RunError: there is a run already, or the directory cannot be made.
+    """
+
+    def __init__(
+        self, directory: Path, manifest: dict[str, Any], dof_names: tuple[str, ...], *, overwrite: bool = False
+    ) -> None:
+        check_free(directory, overwrite)
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            (directory / TRACK).unlink(missing_ok=True)
+        except OSError as error:
+            raise RunError(f"The directory {directory} cannot be made: {error.strerror}.") from None
+        self._directory, self._dof_names = directory, dof_names
+        self._manifest = {**manifest, "complete": False, "frames_tracked": 0}
+        self._rows: list[TrackRow] = []
+        self._save(complete=False)
+
+    def add(self, result: TrackedFrame) -> None:
+        """Add the next frame.
+
+        Raises:
+            RunError: the directory cannot be written to any more.
+        """
+        self._rows.append(row_of(result))
+        if len(self._rows) % _SAVED_EVERY == 0:
+            self._save(complete=False)
+
+    def _save(self, *, complete: bool) -> None:
+        write_track(self.track, self._directory / TRACK)
+        self._manifest |= {"complete": complete, "frames_tracked": len(self._rows)}
+        write_manifest(self._manifest, self._directory / MANIFEST)
+
+    @property
+    def track(self) -> Track:
+        """What was added until now."""
+        return track_of(self._rows, self._dof_names)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._save(complete=kind is None)
+
+
+def check_free(directory: Path, overwrite: bool) -> None:
+    """Check that a run may be written to a directory, before any work is done.
+
+    Raises:
+        RunError: there is something else there already.
+    """
+    if directory.exists() and not directory.is_dir():
+        raise RunError(f"{directory} is a file: choose a directory for the run.")
+    if not directory.exists() or not any(directory.iterdir()):
+        return
+    if not (directory / MANIFEST).exists():
+        raise RunError(f"The directory {directory} holds other things than a run: choose a new one.")
+    if not overwrite:
+        raise RunError(f"The directory {directory} holds a run already: choose another, or replace it with --force.")
+
+
+def read_run(directory: Path) -> Run:
+    """Read a run.
+
+    Raises:
+        RunError: it is missing or damaged.
+    """
+    manifest = read_manifest(directory / MANIFEST)
+    plan = plan_of(manifest, f"The manifest of {directory}")
+    return Run(manifest, plan, read_track(directory / TRACK))
+
+
+def reopen_session(manifest: dict[str, Any], uri: str | Path | None = None) -> Session:
+    """Open the session of a run again, and check that it is the same recording.
+
+    Args:
+        manifest: of the run.
+        uri: where the session lies now, if it was moved.
+
+    Raises:
+        SessionError: it cannot be opened.
+        RunError: it is another recording.
+    """
+    stored = manifest["session"]
+    session = open_session(uri or stored["uri"], camera=stored["camera_file"])
+    check_same_session(manifest, session)
+    return session
+
+
+def check_same_session(manifest: dict[str, Any], session: Session) -> None:
+    """Check by its fingerprint that a session is the one that a run tracked.
+
+    Raises:
+        RunError: it is another recording.
+        SessionError: a frame cannot be read.
+    """
+    if session.fingerprint() != manifest["session"]["fingerprint"]:
+        raise RunError(
+            f"{session.uri} is not the recording of this run (its fingerprint differs): give the right session."
+        )

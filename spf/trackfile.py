@@ -1,0 +1,176 @@
+"""The track of a run as a Parquet file: one row a frame, poses and joints as named columns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from spf.errors import RunError
+from spf.frame import JOINT_NAMES
+from spf.track import TrackedFrame
+
+__all__ = ["Track", "TrackRow", "read_track", "row_of", "track_of", "write_track"]
+
+Array = NDArray[np.float64]
+
+_JOINTS = tuple(f"joint_{name}_{axis}" for name in JOINT_NAMES for axis in "xyz")
+_REFERENCE = tuple(f"reference_{row}{column}" for row in range(3) for column in range(3))
+_NUMBERS = ("log_likelihood", "ess", "golden", "overlap", "optimised_share", "evaluations", "seconds")
+_POSE, _STAGE = "pose_", "seconds_"
+
+
+class Track(NamedTuple):
+    """What a run found, N frames.
+
+    Attributes:
+        frame: (N,) int64 index in the session.
+        time: (N,) s since the session's first frame.
+        poses: (N, D), metres and radians, relative to ``references``; the last one known while the hand is lost.
+        references: (N, 3, 3) R_ref.
+        joints: (N, 21, 3) m, of the hand model.
+        lost, recovered: (N,) whether the hand is lost in a frame, and whether it was found again in it.
+        log_likelihood, ess, golden, overlap, optimised_share, evaluations: (N,) NaN where no filter step was made.
+        seconds: (N,) spent on the frame; 0 for frames before the first pose, which no tracker looked at.
+        dof_names: D names of the entries of a pose.
+        timings: stage → (N,) seconds; NaN in frames without that stage.
+    """
+
+    frame: NDArray[np.int64]
+    time: Array
+    poses: Array
+    references: Array
+    joints: Array
+    lost: NDArray[np.bool_]
+    recovered: NDArray[np.bool_]
+    log_likelihood: Array
+    ess: Array
+    golden: Array
+    overlap: Array
+    optimised_share: Array
+    evaluations: Array
+    seconds: Array
+    dof_names: tuple[str, ...]
+    timings: dict[str, Array]
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+
+class TrackRow(NamedTuple):
+    """What a track keeps of a frame: without the filter's internals, which take up to megabytes.
+
+    Attributes:
+        result: of the frame, its info and observation left out.
+        optimised_share, evaluations: of its info; NaN where there is none.
+    """
+
+    result: TrackedFrame
+    optimised_share: float
+    evaluations: float
+
+
+def row_of(result: TrackedFrame) -> TrackRow:
+    """Return what a track keeps of a frame."""
+    bare = result._replace(info=None, observation=None)
+    if result.info is None:
+        return TrackRow(bare, float("nan"), float("nan"))
+    return TrackRow(bare, result.info.optimised_share, float(result.info.evaluations))
+
+
+def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
+    """Gather the frames of a run."""
+
+    def numbers(values: list[Any]) -> Array:
+        return np.array(values, dtype=np.float64)
+
+    results = [row.result for row in rows]
+    nan = float("nan")
+    stages = sorted({stage for result in results for stage in result.timings})
+    count = len(results)
+    return Track(
+        frame=np.array([result.index for result in results], dtype=np.int64),
+        time=numbers([result.time for result in results]),
+        poses=numbers([result.pose for result in results]).reshape(count, len(dof_names)),
+        references=numbers([result.reference for result in results]).reshape(count, 3, 3),
+        joints=numbers([result.joints for result in results]).reshape(count, len(JOINT_NAMES), 3),
+        lost=np.array([result.lost for result in results], dtype=bool),
+        recovered=np.array([result.recovered for result in results], dtype=bool),
+        log_likelihood=numbers([result.log_likelihood for result in results]),
+        ess=numbers([result.ess for result in results]),
+        golden=numbers([result.golden for result in results]),
+        overlap=numbers([result.overlap for result in results]),
+        optimised_share=numbers([row.optimised_share for row in rows]),
+        evaluations=numbers([row.evaluations for row in rows]),
+        seconds=numbers([result.seconds for result in results]),
+        dof_names=dof_names,
+        timings={stage: numbers([result.timings.get(stage, nan) for result in results]) for stage in stages},
+    )
+
+
+def write_track(track: Track, path: Path) -> None:
+    """Write a track; a reader sees the old file or the whole new one, never a part.
+
+    Raises:
+        RunError: the file cannot be written.
+    """
+    columns: dict[str, Any] = {"frame": track.frame, "time": track.time}
+    columns |= {"lost": track.lost, "recovered": track.recovered}
+    columns |= {name: getattr(track, name) for name in _NUMBERS}
+    columns |= {_POSE + name: track.poses[:, i] for i, name in enumerate(track.dof_names)}
+    columns |= _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints)
+    columns |= {_STAGE + stage: values for stage, values in track.timings.items()}
+    part = path.with_name(path.name + ".part")
+    try:
+        pq.write_table(pa.table(columns), part)
+        os.replace(part, path)
+    except OSError as error:
+        raise RunError(f"The track {path} cannot be written: {error.strerror or error}.") from None
+
+
+def _split(names: tuple[str, ...], values: Array) -> dict[str, Array]:
+    flat = values.reshape(len(values), len(names))
+    return {name: flat[:, i] for i, name in enumerate(names)}
+
+
+def read_track(path: Path) -> Track:
+    """Read a track.
+
+    Raises:
+        RunError: the file is missing, torn or no track.
+    """
+    try:
+        # Through Python's own file, whose errors carry the system's words.
+        with path.open("rb") as file:
+            table = pq.read_table(file)
+    except pa.ArrowInvalid:
+        raise RunError(f"The track {path} is torn or no Parquet file: track the session again.") from None
+    except OSError as error:
+        raise RunError(f"The track {path} cannot be read: {error.strerror or error}.") from None
+    found = {name: table.column(name).to_numpy() for name in table.column_names}
+    dof_names = tuple(name.removeprefix(_POSE) for name in found if name.startswith(_POSE))
+    missing = [name for name in ("frame", "time", "lost", *_NUMBERS, *_REFERENCE, *_JOINTS) if name not in found]
+    if missing or not dof_names:
+        raise RunError(f"The file {path} is no track: it lacks the columns {', '.join(missing[:4]) or _POSE + '…'}.")
+
+    def stacked(names: Sequence[str], *shape: int) -> Array:
+        return np.stack([found[name] for name in names], axis=1).reshape(len(table), *shape)
+
+    return Track(
+        frame=found["frame"],
+        time=found["time"],
+        poses=stacked([_POSE + name for name in dof_names], len(dof_names)),
+        references=stacked(_REFERENCE, 3, 3),
+        joints=stacked(_JOINTS, len(JOINT_NAMES), 3),
+        lost=found["lost"],
+        recovered=found["recovered"],
+        **{name: found[name] for name in _NUMBERS},
+        dof_names=dof_names,
+        timings={name.removeprefix(_STAGE): found[name] for name in found if name.startswith(_STAGE)},
+    )
