@@ -1,4 +1,4 @@
-"""What a visitor can do: open, start, step, play, pause, jump, restart, cancel. Frames are tracked in the page's worker."""
+"""What a visitor can do: open, start, step, play, pause, jump, restart, cancel; the page's worker does the work."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from app.results import Entry, thinned
+from app.runner import CancelledError, Report, Runner
+from app.state import Origin, State
 from spf.errors import HandError, SpfError, StartError
 from spf.frame import Frame
 from spf.hand import read_hand_shape
 from spf.prepare import prepare
 from spf.sessions import Session, open_session
-from spf.track import TrackState, Tracking, begin, track_frame
-
-from app.results import Entry, thinned
-from app.runner import CancelledError, Report, Runner
-from app.state import Origin, State
+from spf.track import Tracking, TrackState, begin, track_frame
 
 __all__ = ["Controller"]
 
@@ -163,7 +162,8 @@ class Controller:
         entry = state.results.entry(index - 1)
         if entry is None:
             raise StartError(
-                f"The particles of frame {index - 1} are no longer in memory: go on from the last tracked frame, or restart."
+                f"The particles of frame {index - 1} are no longer in memory: go on from the last tracked frame, "
+                "or restart."
             )
         return tracking, entry.state
 
@@ -186,7 +186,9 @@ class Controller:
             state.error = str(error)
         except Exception as error:
             _log.exception("Unexpected error while %s", task or "tracking a frame")
-            state.error = f"Something unexpected went wrong ({type(error).__name__}: {error}); the server's log says more."
+            state.error = (
+                f"Something unexpected went wrong ({type(error).__name__}: {error}); the server's log says more."
+            )
         state.param.update(task="", share=0.0)
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import panel as pn
 import panel_material_ui as pmu
+import param
 
 from app.controller import Controller
 from app.runner import Runner
@@ -62,10 +63,13 @@ def page() -> pmu.Page:
 
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
-    return pmu.Page(
+    built = pmu.Page(
         title=_TITLE, main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=False,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip
+    with param.edit_constant(built):
+        built.busy = False  # it follows every message otherwise, and the browser lays the whole page out anew each time
+    return built
 
 
 def _grid(state: State, three_d: ThreeD) -> pmu.Column:

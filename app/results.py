@@ -1,4 +1,4 @@
-"""What a run has tracked so far: a short summary of every frame for the plots, and all of the last few hundred frames."""
+"""What a run has tracked so far: a summary of every frame for the plots, and everything of the last few hundred."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Summary(NamedTuple):
     """What the plots over frames show of one.
 
     Attributes:
-        index: of the frame.
+        frame: its index.
         joints: (21, 3) m.
         lost: whether the hand is lost.
         recovered: whether it was found again in this frame.
@@ -46,7 +46,7 @@ class Summary(NamedTuple):
         seconds: spent on the frame.
     """
 
-    index: int
+    frame: int
     joints: NDArray[np.float64]
     lost: bool
     recovered: bool

@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import param
 
+from app.results import Entry, Results, Summary, same_rules
 from spf.errors import SettingError
 from spf.initialise import Start
 from spf.sessions import Session
 from spf.settings import Settings
-from spf.track import TrackState, Tracking
+from spf.track import Tracking, TrackState
 from spf.trackers import PRESETS, TRACKERS, make_settings
-
-from app.results import Entry, Results, Summary, same_rules
 
 __all__ = ["INITS", "Origin", "State"]
 

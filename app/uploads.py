@@ -32,7 +32,7 @@ class Uploads:
             content: of the file.
 
         Raises:
-            SessionError: it is neither ``.mcap`` nor ``.zip``, too large, damaged, or a zip that reaches out of its folder.
+            SessionError: it is neither ``.mcap`` nor ``.zip``, too large, damaged, or reaches out of its folder.
         """
         base = PurePosixPath(name.replace("\\", "/")).name
         ending = PurePosixPath(base).suffix.lower()
@@ -81,7 +81,9 @@ def _check(name: str, members: list[zipfile.ZipInfo]) -> None:
     if not members:
         raise SessionError(f"{name} holds no file: zip the folder of the session.")
     if len(members) > _MOST_FILES:
-        raise SessionError(f"{name} holds {len(members)} files and at most {_MOST_FILES} are taken: upload fewer frames.")
+        raise SessionError(
+            f"{name} holds {len(members)} files and at most {_MOST_FILES} are taken: upload fewer frames."
+        )
     if sum(member.file_size for member in members) > _LARGEST_CONTENT:
         raise SessionError(f"{name} unpacks to more than {_LARGEST_CONTENT // 2**30} GB: upload fewer frames.")
     for member in members:

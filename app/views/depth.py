@@ -8,20 +8,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.state import State
+from app.views.picture import Picture
 from spf.errors import SessionError
 from spf.frame import Camera, Frame
 from spf.observation import Observation
 from spf.render.palette import PREDICTED
-
-from app.state import State
-from app.views.picture import Picture
 
 __all__ = ["Depth", "depth_picture"]
 
 _WIDTH = 736  # pixels, twice what it takes in the page
 _BONES = tuple((0 if i % 4 == 1 else i - 1, i) for i in range(1, 21))
 _ESTIMATE, _OUTLINE = (255, 255, 255), (25, 25, 25)  # RGB
-_TRUTH = tuple(int(round(255 * part)) for part in PREDICTED)
+_TRUTH = tuple(round(255 * part) for part in PREDICTED)
 _BACKGROUND = (42, 48, 56)
 
 
@@ -68,7 +67,7 @@ def depth_picture(
     scale = _WIDTH / frame.depth.shape[1]
     rgb = _coloured(frame.depth, None if observation is None else _region(frame, observation))
     size = (_WIDTH, round(frame.depth.shape[0] * scale))
-    canvas = cv2.resize(rgb, size, interpolation=cv2.INTER_NEAREST)
+    canvas = np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
     if truth is not None:
         _skeleton(canvas, frame.camera, truth, scale, _TRUTH)
     if joints is not None:

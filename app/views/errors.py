@@ -35,9 +35,9 @@ class JointErrors(FramePlot):
         no_truth = session is not None and not session.has_truth
         self.heading.object = heading(f"{_TITLE}: no truth in this session" if no_truth else _TITLE, _LOST)
         errors = 1000 * np.array([s.error for s in summaries])
-        self.source.data = {"frame": np.array([s.index for s in summaries]), "error": errors}
+        self.source.data = {"frame": np.array([s.frame for s in summaries]), "error": errors}
         known = errors[np.isfinite(errors)]
         top = max(20.0, 1.15 * float(known.max())) if len(known) else 20.0
         self.figure.y_range.update(start=0, end=top)
-        lost = [s.index for s in summaries if s.lost]
+        lost = [s.frame for s in summaries if s.lost]
         self.lost.data = {"frame": lost, "height": [top] * len(lost)}

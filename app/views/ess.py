@@ -26,5 +26,5 @@ class EffectiveSamples(FramePlot):
     def draw_frames(self) -> None:
         """Show the frames tracked so far; the axis ends at the number of samples, 2N."""
         summaries = self.state.results.summaries
-        self.source.data = {"frame": [s.index for s in summaries], "ess": [s.ess for s in summaries]}
+        self.source.data = {"frame": [s.frame for s in summaries], "ess": [s.ess for s in summaries]}
         self.figure.y_range.end = 2.0 * getattr(self.state.settings, "n", 1) + 0.5

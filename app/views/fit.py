@@ -33,7 +33,7 @@ class Fit(FramePlot):
         """Show the frames tracked so far."""
         summaries = self.state.results.summaries
         self.source.data = {
-            "frame": [s.index for s in summaries],
+            "frame": [s.frame for s in summaries],
             "golden": [s.golden for s in summaries],
             "overlap": [s.overlap for s in summaries],
         }

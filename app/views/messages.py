@@ -22,9 +22,16 @@ class Messages:
         self._warning = pmu.Alert(severity="warning", css_classes=["message-warning"], **options)
         self._loss = pmu.Alert(severity="warning", css_classes=["message-loss"], **{**options, "variant": "filled"})
         self._text = pmu.Typography("", variant="body2", margin=(10, 8), width=250)
-        self._bar = pmu.LinearProgress(value=0, max=100, sizing_mode="stretch_width", margin=(18, 8), variant="determinate")
+        self._bar = pmu.LinearProgress(
+            value=0, max=100, sizing_mode="stretch_width", margin=(18, 8), variant="determinate"
+        )
         stop = pmu.Button(
-            label="Cancel", icon="close", size="small", variant="outlined", on_click=lambda _event: cancel(), margin=(4, 8)
+            label="Cancel",
+            icon="close",
+            size="small",
+            variant="outlined",
+            on_click=lambda _event: cancel(),
+            margin=(4, 8),
         )
         self._work = pmu.Row(self._text, self._bar, stop, visible=False, sizing_mode="stretch_width")
         state.param.watch(self._follow, ["error", "warning", "task", "share", "revision", "frame"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 import param
 from panel.custom import JSComponent
@@ -74,7 +74,7 @@ class Picture(JSComponent):
     }
     """
 
-    _stylesheets = [
+    _stylesheets: ClassVar[list[str]] = [
         """
         :host { display: block; }
         .picture-frame { position: relative; width: 100%; height: 100%; background: #2a3038; border-radius: 6px;

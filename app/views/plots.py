@@ -10,9 +10,8 @@ import panel as pn
 from bokeh.models import Span
 from bokeh.plotting import figure
 
-from spf.render.palette import OPTIMISED, PREDICTED, RESIDUAL
-
 from app.state import State
+from spf.render.palette import OPTIMISED, PREDICTED, RESIDUAL
 
 __all__ = ["AFTER", "BEFORE", "CALM", "LOSS", "FramePlot", "Plot", "calm_figure", "css", "heading"]
 

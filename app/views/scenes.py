@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from app.results import Entry
 from spf.hand.kinematics import joints_of, pose_hand
 from spf.hand.model import Hand
 from spf.render import Scene, ViewCamera, particles_scene, reconstruction_scene, trajectories_scene
-
-from app.results import Entry
 
 __all__ = ["PICTURES", "scenes_of", "view_of"]
 

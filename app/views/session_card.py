@@ -9,11 +9,10 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmu
 
-from spf.errors import SessionError
-from spf.sessions import Session
-
 from app.state import State
 from app.uploads import LARGEST_UPLOAD, Uploads
+from spf.errors import SessionError
+from spf.sessions import Session
 
 __all__ = ["SessionCard", "described"]
 
@@ -83,12 +82,17 @@ class SessionCard:
 def described(session: Session) -> str:
     """Return what is known of a session, as HTML."""
     camera = session.camera
-    rate = f" · {(len(session) - 1) / session.times[-1]:.0f} frames/s" if len(session) > 1 and session.times[-1] > 0 else ""
+    rate = (
+        f" · {(len(session) - 1) / session.times[-1]:.0f} frames/s"
+        if len(session) > 1 and session.times[-1] > 0
+        else ""
+    )
     optics = f"f {camera.fx:.0f} px" if camera.model == "pinhole" else "orthographic"
+    side = f"{session.side} hand" if session.side else "side unknown"
     facts = [
         f"<b>{html.escape(session.name)}</b> · {len(session)} frames{rate}",
         f"{camera.width}×{camera.height} · {optics} · {html.escape(session.format)}",
-        f"{session.side or 'side unknown'}{' hand' if session.side else ''} · {'with' if session.has_truth else 'no'} truth",
+        f"{side} · {'with' if session.has_truth else 'no'} truth",
     ]
     warnings = "".join(f"<div class='session-warning'>{html.escape(text)}</div>" for text in session.warnings)
     style = "<style>.session-warning{color:#8a4b00;margin-top:4px}</style>"

@@ -8,10 +8,9 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmu
 
+from app.state import State
 from spf.settings import SettingInfo
 from spf.trackers import PRESETS, TRACKERS
-
-from app.state import State
 
 __all__ = ["SettingsCard"]
 
@@ -120,14 +119,17 @@ def _slider(info: SettingInfo) -> Any:
     unit = f", {info.unit}" if info.unit else ""
     return kind(
         label=f"{info.symbol} · {heading}{unit}", value=info.default, start=info.kind(least), end=info.kind(most),
-        step=info.kind(step), description=info.meaning, size="small", sizing_mode="stretch_width", margin=(4, 16, 0, 12),
+        step=info.kind(step), description=info.meaning, size="small",
+        sizing_mode="stretch_width", margin=(4, 16, 0, 12),
     )  # fmt: skip
 
 
 def _field(info: SettingInfo) -> Any:
     label, about = _label(info), info.meaning
     if info.kind is bool:
-        return pmu.Checkbox(label=label, value=info.default, description=about, size="small", sizing_mode="stretch_width")
+        return pmu.Checkbox(
+            label=label, value=info.default, description=about, size="small", sizing_mode="stretch_width"
+        )
     if info.kind is str:
         return pmu.Select(
             label=label, value=info.default, options=list(info.choices), description=about, size="small",

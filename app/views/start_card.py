@@ -21,13 +21,21 @@ class StartCard:
             state.param.init, label="First pose", options=INITS, size="small", sizing_mode="stretch_width"
         )
         pose_file = pmu.TextInput.from_param(
-            state.param.pose_file, label="Path of the pose file", size="small", visible=False, sizing_mode="stretch_width"
+            state.param.pose_file,
+            label="Path of the pose file",
+            size="small",
+            visible=False,
+            sizing_mode="stretch_width",
         )
         shape = pmu.Select.from_param(
             state.param.shape, label="Hand", options=SHAPES, size="small", sizing_mode="stretch_width"
         )
         hand_file = pmu.TextInput.from_param(
-            state.param.hand_file, label="Path of the hand file", size="small", visible=False, sizing_mode="stretch_width"
+            state.param.hand_file,
+            label="Path of the hand file",
+            size="small",
+            visible=False,
+            sizing_mode="stretch_width",
         )
         seed = pmu.IntInput.from_param(
             state.param.seed, label="Seed", size="small", start=0, width=110,

@@ -9,13 +9,12 @@ from typing import Any
 
 import panel as pn
 
-from spf.errors import RenderError, RenderUnavailableError
-from spf.render import Renderer, Scene
-
 from app.results import Entry
 from app.state import State
 from app.views.picture import Picture
 from app.views.scenes import PICTURES, scenes_of, view_of
+from spf.errors import RenderError, RenderUnavailableError
+from spf.render import Renderer, Scene
 
 __all__ = ["ThreeD"]
 
