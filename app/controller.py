@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -22,6 +23,7 @@ __all__ = ["Controller"]
 
 T = TypeVar("T")
 Open = Callable[[str, str | None], Session]
+Wanted = Callable[[], bool]
 _log = logging.getLogger(__name__)
 
 
@@ -47,6 +49,8 @@ class Controller:
         drawn: Callable[[], Awaitable[None]] = _at_once,
     ) -> None:
         self.state, self._runner, self._open, self.drawn = state, runner, open_, drawn
+        self._turn = 0  # counts what was cancelled, so that an action knows when it no longer is the one that runs
+        self._advancing = asyncio.Lock()
 
     async def open(self, uri: str, camera: str = "") -> None:
         """Open a session; the one before stays when it cannot be."""
@@ -60,9 +64,9 @@ class Controller:
     async def start(self) -> None:
         """Find the first pose as chosen and track the first frame."""
         self.cancel()
-        async with self._doing("Finding the first pose"):
+        async with self._doing("Finding the first pose") as wanted:
             self.state.begin(await self._run(self._preparation()))
-            await self._advance()
+            await self._advance(wanted)
 
     def _preparation(self) -> Callable[[Report], Origin]:
         """Return the work of Start, with everything that was chosen until now."""
@@ -84,8 +88,8 @@ class Controller:
         """Go on by one frame: track it, or show it again if it was tracked with the present settings."""
         if self.state.busy:
             return
-        async with self._doing(""):
-            await self._advance()
+        async with self._doing("") as wanted:
+            await self._advance(wanted)
 
     async def play(self) -> None:
         """Step until the end of the session or until paused."""
@@ -93,12 +97,13 @@ class Controller:
         if state.busy or state.next_frame is None:
             return
         state.playing = True
-        try:
-            async with self._doing(""):
-                while state.playing and await self._advance():
+        async with self._doing("") as wanted:
+            try:
+                while state.playing and await self._advance(wanted):
                     await self.drawn()
-        finally:
-            state.playing = False
+            finally:
+                if wanted():
+                    state.playing = False
 
     def pause(self) -> None:
         """Stop after the frame in flight."""
@@ -114,9 +119,9 @@ class Controller:
         if last is None or frame <= last:
             state.show(frame)
             return
-        async with self._doing(f"Tracking to frame {frame}"):
+        async with self._doing(f"Tracking to frame {frame}") as wanted:
             state.show(last)
-            while state.frame < frame and await self._advance():
+            while state.frame < frame and await self._advance(wanted):
                 state.share = (state.frame - last) / (frame - last)
 
     async def restart(self) -> None:
@@ -125,12 +130,13 @@ class Controller:
         if state.origin is None:
             return
         self.cancel()
-        async with self._doing(""):
+        async with self._doing("") as wanted:
             state.begin(state.origin)
-            await self._advance()
+            await self._advance(wanted)
 
     def cancel(self) -> None:
         """Give up what runs in the background; everything tracked so far stays."""
+        self._turn += 1
         self._runner.cancel()
         self.state.param.update(playing=False, task="", share=0.0)
 
@@ -139,18 +145,21 @@ class Controller:
         self.cancel()
         self._runner.close()
 
-    async def _advance(self) -> bool:
+    async def _advance(self, wanted: Wanted) -> bool:
         """Show the next frame, tracking it if need be; False when there is none."""
         state = self.state
-        index = state.next_frame
-        if index is None:
-            return False
-        if not state.is_current(index):
-            tracking, before = self._before(index)
-            entry, frame = await self._run(_frame_work(state.session, index, tracking, before))
-            state.results.add(entry, frame)
-        state.show(index)
-        return True
+        async with self._advancing:  # clicks that come faster than frames are done one after the other
+            if not wanted():
+                raise CancelledError
+            index = state.next_frame
+            if index is None:
+                return False
+            if not state.is_current(index):
+                tracking, before = self._before(index)
+                entry, frame = await self._run(_frame_work(state.session, index, tracking, before))
+                state.results.add(entry, frame)
+            state.show(index)
+            return True
 
     def _before(self, index: int) -> tuple[Tracking, TrackState]:
         """Return how a frame is to be tracked now, and the tracker's state before it."""
@@ -174,12 +183,16 @@ class Controller:
         self.state.param.update(task=text, share=min(max(share, 0.0), 1.0))
 
     @asynccontextmanager
-    async def _doing(self, task: str) -> AsyncIterator[None]:
-        """Say what is being done meanwhile, and afterwards in one sentence what went wrong."""
-        state = self.state
+    async def _doing(self, task: str) -> AsyncIterator[Wanted]:
+        """Say what is being done meanwhile, and afterwards in one sentence what went wrong.
+
+        Yields:
+            A function that tells whether it is still wanted: nobody has cancelled it.
+        """
+        state, turn = self.state, self._turn
         state.param.update(task=task, share=0.0, error="")
         try:
-            yield
+            yield lambda: self._turn == turn
         except CancelledError:
             return  # whoever cancelled has set the state already, and may be doing something else by now
         except SpfError as error:
@@ -189,7 +202,8 @@ class Controller:
             state.error = (
                 f"Something unexpected went wrong ({type(error).__name__}: {error}); the server's log says more."
             )
-        state.param.update(task="", share=0.0)
+        if self._turn == turn:
+            state.param.update(task="", share=0.0)
 
 
 def _frame_work(
