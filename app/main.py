@@ -1,0 +1,5 @@
+"""Entry of `panel serve app`: one page for each visitor."""
+
+from app.dashboard import page
+
+page().servable()

@@ -1,0 +1,153 @@
+"""What a run has tracked so far: a summary of every frame for the plots, and everything of the last few hundred."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.frame import Frame
+from spf.optimisers.smd import SmdTrace
+from spf.settings import Settings
+from spf.track import TrackedFrame, Tracking, TrackState
+
+__all__ = ["Entry", "Results", "Summary", "joint_error", "same_rules", "thinned"]
+
+PATH_POSES = 26  # poses kept of a trajectory of SMD: enough to draw it
+MEMORY = 256 * 2**20  # bytes of entries that one page keeps
+
+
+class Entry(NamedTuple):
+    """Everything of one tracked frame.
+
+    Attributes:
+        result: of the frame.
+        state: after it, to track on from here.
+        tracking: what it was tracked with.
+    """
+
+    result: TrackedFrame
+    state: TrackState
+    tracking: Tracking
+
+
+class Summary(NamedTuple):
+    """What the plots over frames show of one.
+
+    Attributes:
+        frame: its index.
+        joints: (21, 3) m.
+        lost: whether the hand is lost.
+        recovered: whether it was found again in this frame.
+        ess: effective sample size, nan while lost.
+        golden, overlap: how well the render explains the depth, nan while lost.
+        error: mean distance of the joints from the truth, m; nan where there is no truth.
+        seconds: spent on the frame.
+    """
+
+    frame: int
+    joints: NDArray[np.float64]
+    lost: bool
+    recovered: bool
+    ess: float
+    golden: float
+    overlap: float
+    error: float
+    seconds: float
+
+
+class Results:
+    """The frames tracked in one run, consecutive from its first; oldest entries are forgotten before memory grows."""
+
+    def __init__(self, memory: int = MEMORY) -> None:
+        self._memory = memory
+        self._entries: dict[int, Entry] = {}
+        self._sizes: dict[int, int] = {}
+        self._summaries: dict[int, Summary] = {}
+
+    def add(self, entry: Entry, frame: Frame) -> None:
+        """Store a frame; whatever was tracked after it no longer follows from it and is dropped."""
+        index = entry.result.index
+        for later in [i for i in self._summaries if i >= index]:
+            self._drop(later)
+        result = entry.result
+        self._entries[index] = entry
+        self._sizes[index] = _bytes(entry)
+        self._summaries[index] = Summary(
+            index, result.joints, result.lost, result.recovered, result.ess, result.golden, result.overlap,
+            joint_error(result.joints, frame), result.seconds,
+        )  # fmt: skip
+        while sum(self._sizes.values()) > self._memory and len(self._entries) > 1:
+            oldest = next(iter(self._entries))
+            del self._entries[oldest], self._sizes[oldest]
+
+    def _drop(self, index: int) -> None:
+        del self._summaries[index]
+        self._entries.pop(index, None)
+        self._sizes.pop(index, None)
+
+    def entry(self, index: int) -> Entry | None:
+        """Return everything of a frame, or None when it was not tracked or is no longer in memory."""
+        return self._entries.get(index)
+
+    def summary(self, index: int) -> Summary | None:
+        """Return a frame's summary, or None when it was not tracked."""
+        return self._summaries.get(index)
+
+    @property
+    def summaries(self) -> list[Summary]:
+        """Of all frames tracked, in their order."""
+        return list(self._summaries.values())
+
+    @property
+    def last(self) -> int | None:
+        """Index of the last frame tracked."""
+        return next(reversed(self._summaries), None)
+
+    def lost_since(self, index: int) -> int | None:
+        """Return the frame since which the hand is lost in a frame, or None when it is not."""
+        if index not in self._summaries or not self._summaries[index].lost:
+            return None
+        while index - 1 in self._summaries and self._summaries[index - 1].lost:
+            index -= 1
+        return index
+
+
+def joint_error(joints: NDArray[np.float64], frame: Frame) -> float:
+    """Return the mean distance in metres of joints (21, 3) from a frame's truth; nan where it has none."""
+    if frame.truth is None:
+        return float("nan")
+    distances = np.linalg.norm(joints - frame.truth.joints, axis=1)
+    known = distances[np.isfinite(distances)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def thinned(result: TrackedFrame) -> TrackedFrame:
+    """Return a result whose trajectories hold at most PATH_POSES poses each."""
+    if result.info is None:
+        return result
+    traces = tuple(_thin(trace) for trace in result.info.trajectories)
+    return result._replace(info=result.info._replace(trajectories=traces))
+
+
+def _thin(trace: SmdTrace) -> SmdTrace:
+    count = len(trace.poses)
+    kept = np.unique(np.linspace(0, count - 1, min(count, PATH_POSES)).round().astype(np.intp))
+    return SmdTrace(*(part[kept] for part in trace))
+
+
+def same_rules(tracking: Tracking, tracker: str, settings: Settings) -> bool:
+    """Tell whether a frame was tracked by a tracker with these settings."""
+    return tracking.tracker == tracker and tracking.settings == settings
+
+
+def _bytes(value: object) -> int:
+    """Bytes of all arrays within nested tuples."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    if isinstance(value, Entry):  # `tracking` is shared by all frames
+        return _bytes(tuple(value.result)) + _bytes(tuple(value.state))
+    if isinstance(value, tuple):
+        return sum(_bytes(part) for part in value)
+    return 0

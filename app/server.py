@@ -1,0 +1,45 @@
+"""What all pages of a server share: one renderer, and the sessions that someone has opened."""
+
+from __future__ import annotations
+
+import atexit
+from functools import lru_cache
+from pathlib import Path
+
+import panel as pn
+
+from spf.render import Renderer
+from spf.sessions import Session, open_session
+
+__all__ = ["SAMPLES", "bundled", "open_shared", "renderer"]
+
+#: Where the sample sessions are, and where new captures land.
+SAMPLES = Path(__file__).resolve().parent.parent / "sessions"
+_KEPT = 3600  # s that an opened session is kept for the next who asks
+
+
+@lru_cache(maxsize=1)
+def renderer() -> Renderer:
+    """Return the server's renderer, started at the first call."""
+    shared = Renderer()
+    atexit.register(shared.close)
+    return shared
+
+
+def bundled() -> dict[str, str]:
+    """Return name → path of the sessions in the project's own folder."""
+    return {path.stem: str(path) for path in sorted(SAMPLES.glob("*.mcap"))}
+
+
+def open_shared(uri: str, camera: str | None) -> Session:
+    """Open a session once for all pages; a file that changed is opened again.
+
+    Raises:
+        SessionError: see :func:`spf.sessions.open_session`.
+    """
+    path = Path(uri).expanduser()
+    stamp = path.stat().st_mtime_ns if path.exists() else 0
+    session: Session = pn.state.as_cached(
+        f"session {path.absolute()} {camera} {stamp}", lambda: open_session(path, camera), ttl=_KEPT
+    )
+    return session

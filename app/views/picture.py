@@ -1,0 +1,107 @@
+"""A picture in the browser: bytes in, drags and turns of the wheel out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import param
+from panel.custom import JSComponent
+
+__all__ = ["Picture"]
+
+
+class Picture(JSComponent):
+    """Shows an encoded picture; reports when it is on the screen, and how the mouse wants to turn it."""
+
+    image: bytes = param.Bytes(b"", doc="a JPEG or PNG file, or nothing")
+    hint: str = param.String("", doc="what is said while there is no picture")
+    alt: str = param.String("", doc="what the picture shows, for who cannot see it")
+    turns: bool = param.Boolean(False, doc="whether the mouse orbits")
+
+    _esm = """
+    export function render({ model, el }) {
+      const frame = document.createElement('div');
+      frame.className = 'picture-frame';
+      const img = document.createElement('img');
+      const hint = document.createElement('div');
+      hint.className = 'picture-hint';
+      frame.append(img, hint);
+      let url = null;
+      const show = () => {
+        const bytes = model.image;
+        const some = bytes && bytes.byteLength > 0;
+        img.style.visibility = some ? 'visible' : 'hidden';
+        hint.style.display = some || !model.hint ? 'none' : 'flex';
+        hint.textContent = model.hint;
+        img.alt = model.alt;
+        if (!some) { model.send_msg({ kind: 'shown' }); return; }
+        const old = url;
+        url = URL.createObjectURL(new Blob([bytes]));
+        img.onload = () => {
+          if (old) URL.revokeObjectURL(old);
+          frame.dataset.shown = String(Number(frame.dataset.shown || 0) + 1);
+          model.send_msg({ kind: 'shown' });
+          answered();
+        };
+        img.src = url;
+      };
+      model.on('image', show);
+      model.on('hint', show);
+      show();
+      if (!model.turns) return frame;
+
+      // Movements add up while the server draws; the sum is sent when its picture has arrived, or after a while.
+      let right = 0, up = 0, magnify = 1, waiting = false, timer = null;
+      const send = () => {
+        if (waiting || (right === 0 && up === 0 && magnify === 1)) return;
+        model.send_msg({ kind: 'orbit', right, up, magnify });
+        right = 0; up = 0; magnify = 1; waiting = true;
+        timer = setTimeout(answered, 300);
+      };
+      const answered = () => { clearTimeout(timer); waiting = false; send(); };
+      frame.classList.add('turns');
+      frame.addEventListener('pointerdown', (e) => { frame.setPointerCapture(e.pointerId); e.preventDefault(); });
+      frame.addEventListener('pointermove', (e) => {
+        if (!frame.hasPointerCapture(e.pointerId)) return;
+        right -= e.movementX * 0.01; up += e.movementY * 0.01; send();
+      });
+      frame.addEventListener('wheel', (e) => {
+        e.preventDefault(); magnify *= Math.exp(-e.deltaY * 0.0015); send();
+      }, { passive: false });
+      frame.addEventListener('dblclick', () => model.send_msg({ kind: 'reset' }));
+      return frame;
+    }
+    """
+
+    _stylesheets: ClassVar[list[str]] = [
+        """
+        :host { display: block; }
+        .picture-frame { position: relative; width: 100%; height: 100%; background: #2a3038; border-radius: 6px;
+                         overflow: hidden; touch-action: none; }
+        .picture-frame.turns { cursor: grab; }
+        .picture-frame.turns:active { cursor: grabbing; }
+        .picture-frame img { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain;
+                             user-select: none; pointer-events: none; }
+        .picture-hint { position: absolute; inset: 0; display: flex; align-items: center; justify-content: center;
+                        text-align: center; padding: 24px; color: #c9d1da; font: 14px/1.5 Roboto, sans-serif; }
+        """
+    ]
+
+    def __init__(
+        self,
+        on_shown: Callable[[], None] | None = None,
+        on_orbit: Callable[[float, float, float], None] | None = None,
+        on_reset: Callable[[], None] | None = None,
+        **params: Any,
+    ) -> None:
+        super().__init__(turns=on_orbit is not None, **params)
+        self._shown, self._orbit, self._reset = on_shown, on_orbit, on_reset
+
+    def _handle_msg(self, msg: dict[str, Any]) -> None:
+        if msg["kind"] == "shown" and self._shown is not None:
+            self._shown()
+        elif msg["kind"] == "orbit" and self._orbit is not None:
+            self._orbit(float(msg["right"]), float(msg["up"]), float(msg["magnify"]))
+        elif msg["kind"] == "reset" and self._reset is not None:
+            self._reset()

@@ -1,0 +1,73 @@
+"""Restart, step, play, pause and the slider over the frames."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import panel as pn
+import panel_material_ui as pmu
+
+from app.controller import Controller
+from app.state import State
+
+__all__ = ["Transport"]
+
+
+class Transport:
+    """The row under the heading."""
+
+    def __init__(self, state: State, controller: Controller) -> None:
+        self._state, self._controller = state, controller
+        button = {"variant": "outlined", "size": "small", "margin": (8, 4)}
+        self._restart = pmu.Button(label="Restart", icon="replay", on_click=self._on_restart, **button)
+        self._step = pmu.Button(label="Step", icon="skip_next", on_click=self._on_step, **button)
+        self._play = pmu.Button(label="Play", icon="play_arrow", on_click=self._on_play, width=104, size="small",
+                                margin=(8, 4))  # fmt: skip
+        self._slider = pmu.IntSlider(
+            label="Frame", show_value=False, start=0, end=1, value=0, disabled=True, sizing_mode="stretch_width",
+            margin=(8, 18), size="small",
+        )  # fmt: skip
+        self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
+        self._slider.param.watch(self._on_slide, "value_throttled")
+        state.param.watch(self._follow, ["session", "frame", "revision", "task", "playing", "origin"])
+        self._follow()
+        self.panel = pmu.Row(
+            self._restart, self._step, self._play, self._slider, self._count, sizing_mode="stretch_width"
+        )
+
+    async def _on_restart(self, _event: Any) -> None:
+        await self._controller.restart()
+
+    async def _on_step(self, _event: Any) -> None:
+        await self._controller.step()
+
+    async def _on_play(self, _event: Any) -> None:
+        if self._state.playing:
+            self._controller.pause()
+        else:
+            await self._controller.play()
+
+    async def _on_slide(self, event: Any) -> None:
+        await self._controller.jump(event.new)
+
+    def _follow(self, *_events: Any) -> None:
+        state = self._state
+        ready = state.origin is not None and not state.task
+        can_go = ready and state.next_frame is not None
+        self._restart.disabled = not ready
+        self._step.disabled = not can_go or state.playing
+        self._play.param.update(
+            disabled=not (can_go or state.playing),
+            label="Pause" if state.playing else "Play",
+            icon="pause" if state.playing else "play_arrow",
+        )
+        if state.session is None:
+            return
+        self._slider.param.update(end=max(len(state.session) - 1, 1), value=state.frame, disabled=False)
+        summary, last = state.summary, state.results.last
+        tracked = "not tracked" if last is None else f"tracked to {last}"
+        took = "" if summary is None else f" · {1000 * summary.seconds:.0f} ms"
+        self._count.object = (
+            "<div style='font:13px/1.3 Roboto,sans-serif;color:#2a3038;font-variant-numeric:tabular-nums'>"
+            f"<b>Frame {state.frame}</b> of {len(state.session) - 1} · {tracked}{took}</div>"
+        )

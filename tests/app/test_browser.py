@@ -1,0 +1,198 @@
+"""The dashboard as a visitor meets it: served as the README says, in a real browser."""
+
+import io
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+REPOSITORY = Path(__file__).resolve().parent.parent.parent
+ARTEFACTS = REPOSITORY / "tests" / "artefacts"
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+PATIENCE = 180_000  # ms; a first run compiles the kernels
+QUIET = [
+    *("--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"),
+    *("--disable-sync", "--no-first-run", "--disable-default-apps"),
+]
+TROUBLE = re.compile(r"Traceback|\bERROR\b|Error running|Exception|exception")
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    """The address of a server, and its log so far."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    log = tmp_path_factory.mktemp("server") / "log"
+    with log.open("w") as file:
+        command = [sys.executable, "-m", "panel", "serve", "app", "--port", str(port)]
+        process = subprocess.Popen(command, cwd=REPOSITORY, stdout=file, stderr=subprocess.STDOUT)
+        try:
+            _wait_for(f"http://localhost:{port}/app", process)
+            yield f"http://localhost:{port}/app", log
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(60)
+
+
+def _wait_for(address, process):
+    for _ in range(600):
+        assert process.poll() is None, "the server ended"
+        try:
+            with urllib.request.urlopen(address, timeout=120):
+                return
+        except OSError:
+            time.sleep(0.2)
+    pytest.fail("the server did not come up")
+
+
+@pytest.fixture
+def page(server):
+    """A loaded page; at the end, it has asked no other host for anything, and neither side has complained."""
+    address, log = server
+    ARTEFACTS.mkdir(exist_ok=True)
+    elsewhere, complaints = [], []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page.set_default_timeout(PATIENCE)
+        page.on("request", lambda request: elsewhere.append(request.url) if _is_elsewhere(request.url) else None)
+        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.goto(address)
+        picture(page, "Depth image").wait_for()
+        yield page
+        page.wait_for_timeout(500)  # whatever is under way arrives before the page goes
+        browser.close()
+    assert elsewhere == []
+    assert complaints == []
+    assert not [line for line in log.read_text().splitlines() if TROUBLE.search(line)]
+
+
+def _is_elsewhere(url):
+    return not url.startswith(("http://localhost:", "ws://localhost:", "data:", "blob:"))
+
+
+def picture(page, name):
+    """The frame around a picture that has been shown."""
+    return page.locator(".picture-frame[data-shown]").filter(has=page.get_by_alt_text(name, exact=True))
+
+
+def pixels(page, name):
+    return np.asarray(Image.open(io.BytesIO(picture(page, name).screenshot())).convert("RGB")).astype(int)
+
+
+def button(page, name):
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def at_frame(page, index):
+    page.get_by_text(f"Frame {index} of", exact=False).filter(visible=True).first.wait_for()
+
+
+def settled(page):
+    """Wait until no new picture comes: the sharp one is there."""
+
+    before = None
+    while (now := [f.get_attribute("data-shown") for f in page.locator(".picture-frame").all()]) != before:
+        before = now
+        page.wait_for_timeout(1200)
+
+
+def start_from_truth(page):
+    page.get_by_label("First pose").click()
+    page.locator("li", has_text="Take it from the truth").click()
+    button(page, "Start").click()
+    picture(page, "Reconstructed hand").wait_for()
+    button(page, "Step").and_(page.locator(":enabled")).wait_for()
+
+
+def nudge(page, name, presses):
+    """Move a slider with the keyboard."""
+    page.get_by_role("slider", name=re.compile(name)).focus()
+    for _ in range(presses):
+        page.keyboard.press("ArrowRight")
+
+
+def plotted(page, column):
+    """The values of a column in every data source of the page."""
+    script = """(column) => Bokeh.documents.flatMap((doc) => [...doc._all_models.values()])
+        .filter((model) => model.type === 'ColumnDataSource' && column in model.data)
+        .flatMap((model) => [...model.data[column]])"""
+    return page.evaluate(script, column)
+
+
+PICTURES = ("Particles before and after optimisation", "Trajectories of SMD", "Reconstructed hand", "Depth image")
+
+
+def test_a_bundled_session_is_tracked_and_tuned(page):
+    page.screenshot(path=ARTEFACTS / "first.png")
+    assert pixels(page, "Depth image").std() > 5
+    start_from_truth(page)
+    settled(page)
+    before = {name: pixels(page, name) for name in PICTURES}
+    page.screenshot(path=ARTEFACTS / "started.png")
+    nudge(page, "N", 4)
+    nudge(page, "h", 10)
+    page.get_by_text("Differs from the preset").wait_for()
+    for index in range(1, 11):
+        button(page, "Step").click()
+        at_frame(page, index)
+    settled(page)
+    page.wait_for_function("Bokeh.documents.length > 0")
+    for name in PICTURES:
+        after = pixels(page, name)
+        assert after.std() > 5, f"{name} is blank"
+        assert np.abs(after - before[name]).mean() > 0.5, f"{name} did not change"
+    page.screenshot(path=ARTEFACTS / "stepped.png")
+    assert len(plotted(page, "before")) == len(plotted(page, "after")) == 8
+    assert len(plotted(page, "ess")) == len(plotted(page, "golden")) == len(plotted(page, "error")) == 11
+    assert sum(plotted(page, "predicted")) + sum(plotted(page, "optimised")) == pytest.approx(100)
+
+
+def test_playing_pausing_jumping_and_orbiting(page):
+    start_from_truth(page)
+    button(page, "Play").click()
+    at_frame(page, 3)
+    button(page, "Pause").click()
+    button(page, "Play").wait_for()
+    settled(page)
+    before = pixels(page, "Reconstructed hand")
+    box = picture(page, "Reconstructed hand").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 90, y + 30, steps=6)
+    page.mouse.up()
+    settled(page)
+    page.screenshot(path=ARTEFACTS / "orbited.png")
+    turned = pixels(page, "Reconstructed hand")
+    assert np.abs(turned - before).mean() > 1
+    picture(page, "Trajectories of SMD").dblclick()
+    settled(page)
+    assert np.abs(pixels(page, "Reconstructed hand") - before).mean() < np.abs(turned - before).mean() / 4
+    page.get_by_role("slider", name="Frame").focus()
+    page.keyboard.press("Home")
+    at_frame(page, 0)
+
+
+def test_a_bad_path_is_one_sentence_in_the_page(page):
+    page.get_by_text("Open another").click()
+    page.get_by_label("Path of a file or folder").fill("/no/such/session")
+    button(page, "Open").click()
+    page.get_by_text("There is no file or folder /no/such/session").wait_for()
+    page.screenshot(path=ARTEFACTS / "bad-path.png")
+    assert os.linesep + "Traceback" not in page.content()

@@ -1,0 +1,64 @@
+"""The state of a page: settings, presets, what a step leads to, the view."""
+
+import pytest
+
+from app.state import State
+from spf.trackers import PRESETS, make_settings
+
+
+@pytest.fixture
+def state():
+    return State()
+
+
+def test_a_change_is_told_apart_from_the_preset_and_undone(state):
+    state.change("k", 3.0)
+    state.change("n", 8)
+    assert state.differences == {"k": (make_settings("spf").k, 3.0), "n": (4, 8)}
+    state.back_to_preset()
+    assert state.settings == make_settings("spf")
+    assert state.differences == {}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_preset_brings_its_values(state, preset):
+    state.change("h", 9.0)
+    state.preset = "paper" if preset == "default" else "default"
+    state.preset = preset
+    assert state.settings == make_settings("spf", preset)
+
+
+def test_a_tracker_brings_its_own_settings(state):
+    state.tracker = "smd"
+    assert state.settings == make_settings("smd")
+
+
+@pytest.mark.parametrize(("name", "value"), [("n", 0), ("k", float("nan")), ("mu", -1.0), ("nonsense", 1)])
+def test_an_impossible_value_is_refused_in_one_sentence(state, name, value):
+    before = state.settings
+    state.change(name, value)
+    assert state.settings == before
+    assert name in state.error
+    assert "\n" not in state.error
+
+
+def test_a_refused_value_is_put_back_in_the_widgets(state):
+    seen = []
+    state.param.watch(lambda event: seen.append(event.new), "settings", onlychanged=False)
+    state.change("n", 0)
+    assert seen == [state.settings]
+
+
+def test_there_is_nowhere_to_step_without_a_start(state):
+    assert state.next_frame is None
+    assert not state.busy
+
+
+def test_the_view_adds_up_and_resets(state):
+    state.orbit(0.2, -0.1, 2.0)
+    state.orbit(0.2, 0.0, 1.0)
+    assert (state.azimuth, state.elevation, state.zoom) == pytest.approx((0.4, -0.1, 2.0))
+    state.orbit(0.0, 0.0, 1e6)
+    assert state.zoom < 100
+    state.reset_view()
+    assert (state.azimuth, state.elevation, state.zoom) == (0.0, 0.0, 1.0)
