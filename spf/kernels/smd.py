@@ -76,7 +76,10 @@ def smd_update(pose, step, trace, gradient, product, meta_step, decay, first, lo
 
 @kernel
 def see(skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer, work, points, normals, projected, depth, coarse, visible):  # fmt: skip
-    """Pose the skin and list the vertices that the camera sees in this pose; returns their number."""
+    """Pose the skin and list the vertices of the hand that the camera sees in this pose; returns their number.
+
+    Vertices past the wrist belong to the arm, which bends as the palm does not: they are never listed.
+    """
     pose_bones(skeleton, pose, reference, work.chain)
     skin(surface, work.chain, pose, points, normals)
     project_vertices(points, obs.grid_camera, projected)
@@ -85,7 +88,19 @@ def see(skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer, wo
         rasterise(coarse, proxy_faces, depth)
     else:
         depth[:] = np.float32(1e9)
-    return visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
+    count = visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
+    bones, kept = work.chain.bones, 0
+    for c in range(count):
+        i = visible[c]
+        past = (
+            (points[i, 0] - pose[0] - bones[0, 3]) * bones[0, 2]
+            + (points[i, 1] - pose[1] - bones[0, 7]) * bones[0, 6]
+            + (points[i, 2] - pose[2] - bones[0, 11]) * bones[0, 10]
+        )
+        if past < 0.0:
+            visible[kept] = i
+            kept += 1
+    return kept
 
 
 @kernel
