@@ -140,9 +140,9 @@ def test_offsets_are_found_again_on_any_hand(side, rng):
     posed = pose_hand(hand, pose)
     offsets = 0.05 * rng.normal(size=(21, 3))
     marked = corrected_joints(hand, posed, offsets)
-    np.testing.assert_allclose(relative_offsets(hand, posed, marked), offsets, atol=1e-12)
+    np.testing.assert_allclose(relative_offsets(hand, posed, marked), offsets, atol=1e-6)  # the mesh file holds float32
     lengths = np.linalg.norm(marked - posed.joints, axis=1)
-    np.testing.assert_allclose(lengths, hand.length * np.linalg.norm(offsets, axis=1))
+    np.testing.assert_allclose(lengths, hand.length * np.linalg.norm(offsets, axis=1), rtol=1e-5)
 
 
 def test_offsets_of_a_left_hand_are_the_mirror_image():
