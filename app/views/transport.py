@@ -24,8 +24,8 @@ class Transport:
         self._play = pmu.Button(label="Play", icon="play_arrow", on_click=self._on_play, width=104, size="small",
                                 margin=(8, 4))  # fmt: skip
         self._slider = pmu.IntSlider(
-            label="Frame", show_value=False, start=0, end=1, value=0, disabled=True, sizing_mode="stretch_width",
-            margin=(8, 18), size="small",
+            label="", show_value=False, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
+            sizing_mode="stretch_width", margin=(8, 18), size="small",
         )  # fmt: skip
         self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
         self._slider.param.watch(self._on_slide, "value_throttled")
