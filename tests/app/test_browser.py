@@ -75,7 +75,10 @@ def page(server):
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.goto(address)
         picture(page, "Depth image").wait_for()
-        yield page
+        try:
+            yield page
+        finally:
+            page.screenshot(path=ARTEFACTS / "last.png")
         page.wait_for_timeout(500)  # whatever is under way arrives before the page goes
         browser.close()
     assert elsewhere == []
