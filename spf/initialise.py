@@ -25,7 +25,7 @@ from spf.hand.shape import HandShape
 from spf.observation import Observation, observe
 from spf.optimisers.smd import optimise
 from spf.parallel import map_threads
-from spf.search import Hypotheses, SearchSettings, refine, search
+from spf.search import Hypotheses, SearchSettings, refine, search, size_penalty
 from spf.segmentation import find_regions
 
 __all__ = ["Start", "find_start", "locate", "reach_of", "recover"]
@@ -178,6 +178,8 @@ def _best_followed(
             fitted = _Hypothesis(sized, _relative_to_camera(views[0]), hypothesis.energy)
         infos = _track(fitted, ahead, rng)
         energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
+        if shape is None:
+            energy += float(size_penalty(fitted.shape.scale, SearchSettings()))
         rated.append((energy + 0.5 * (len(ahead) - len(infos)) / len(ahead), fitted))
     rated.sort(key=lambda item: item[0])
     energy, chosen = rated[0]
@@ -207,7 +209,7 @@ def _hypotheses(
     result: list[_Hypothesis] = []
     for side in sides:
         hand = shape.hand() if shape else load_hand(side)
-        settings = SearchSettings(scale_spread=0.0 if shape else 0.3)
+        settings = SearchSettings(scale_spread=0.0) if shape else SearchSettings()
         found: list[_Hypothesis] = []
         for region in regions:
             observation = observe(frame, region.centre, region.radius)
@@ -269,13 +271,17 @@ def _polish(
     return map_threads(run, list(zip(poses, scales, rng.spawn(len(poses)), strict=True)))
 
 
-def recover(frame: Frame, hand: Hand, usual: float, rng: np.random.Generator) -> Array | None:
+def recover(
+    frame: Frame, hand: Hand, limit: float, near: Array, within: float, rng: np.random.Generator
+) -> Array | None:
     """Look for a lost hand of known shape in a frame.
 
     Args:
         frame: the depth image.
         hand: the calibrated hand.
-        usual: golden energy that it is tracked with.
+        limit: golden energy under which a pose is believed.
+        near: (3,) m, where the palm was last.
+        within: m that it can have moved since.
         rng: randomness.
 
     Returns:
@@ -286,9 +292,9 @@ def recover(frame: Frame, hand: Hand, usual: float, rng: np.random.Generator) ->
         observation = observe(frame, region.centre, region.radius)
         if observation.is_empty:
             continue
-        found = locate(hand, observation, region.points, settings, rng)
-        if found and found[0][2] < max(1.4 * usual + 0.08, 0.35):
-            return found[0][1]
+        for _, pose, energy in locate(hand, observation, region.points, settings, rng):
+            if energy < limit and np.linalg.norm(pose[:3] - near) < within:
+                return pose
     return None
 
 

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _KEPT = 64  # decoded frames that are kept: what one start looks at
 _PALM = np.array([0, 1, 5, 9, 13, 17])  # joints that move with the palm, more or less
 _CALIBRATED, _VIEWS = 48, 12  # frames that a hand is calibrated on, and how many of them are looked at
+_PALM_REACH = 0.05  # m around the middle of the palm's joints
 _REST = 0.001  # m per radian: how strongly a fit prefers the bind pose where the joints say nothing
 
 
@@ -142,9 +143,9 @@ def _from_truth(
     """Take the exact pose where the truth has one and the hand is the exact one, else fit a pose to the true joints."""
     if not session.has_truth:
         raise StartError(f"{session.name} has no ground truth to start from; use --init auto or a pose file.")
-    position = next((i for i, frame in enumerate(frames) if frame.truth is not None), None)
+    position = next((i for i, frame in enumerate(frames) if _shows_its_truth(frame)), None)
     if position is None:
-        raise StartError(f"None of the frames of {session.name} to track has a ground truth; use --init auto.")
+        raise StartError(f"None of the frames of {session.name} to track shows a hand with truth; use --init auto.")
     frame = frames[position]
     truth = frame.truth
     assert truth is not None
@@ -156,6 +157,15 @@ def _from_truth(
         shape = _calibrated(session.side or _side_of(truth.joints), frames[position : position + _CALIBRATED], rng)
     pose, reference = fit_pose(shape.hand(), truth.joints)
     return _judged(frame, shape, pose, reference, rng)
+
+
+def _shows_its_truth(frame: Frame) -> bool:
+    """Tell whether a frame has a truth and some surface where that puts the palm; a hand may be just out of view."""
+    if frame.truth is None:
+        return False
+    palm = frame.truth.joints[_PALM]
+    palm = palm[np.isfinite(palm).all(axis=1)]
+    return len(palm) > 0 and not observe(frame, palm.mean(axis=0), _PALM_REACH).is_empty
 
 
 def _calibrated(side: Side, frames: SessionFrames, rng: np.random.Generator) -> HandShape:

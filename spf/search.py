@@ -17,9 +17,10 @@ from spf.cost.problem import Problem, golden
 from spf.hand.model import Hand
 from spf.parallel import map_threads
 
-__all__ = ["Hypotheses", "SearchSettings", "refine", "search"]
+__all__ = ["Hypotheses", "SearchSettings", "refine", "search", "size_penalty"]
 
 Array = NDArray[np.float64]
+_SIZE_WEIGHT = 0.02
 _SPREAD = (0.3, 0.05, -0.2, -0.45)  # rad of abduction of index … little in a hand spread wide
 
 
@@ -42,7 +43,7 @@ class SearchSettings(NamedTuple):
     scouting: int = 14
     generations: int = 45
     scale_mean: float = 1.0
-    scale_spread: float = 0.15
+    scale_spread: float = 0.25
 
 
 class Hypotheses(NamedTuple):
@@ -146,9 +147,13 @@ def _poses(genes: _Genes) -> Array:
 def _judge(problem: Problem, genes: _Genes, settings: SearchSettings) -> Array:
     energies = golden(problem, _poses(genes), genes.scales)[0]
     if settings.scale_spread > 0:
-        off = np.log(genes.scales / settings.scale_mean) / settings.scale_spread
-        energies = energies + 0.01 * off**2
+        energies = energies + size_penalty(genes.scales, settings)
     return energies
+
+
+def size_penalty(scale: Array | float, settings: SearchSettings) -> Array | float:
+    """What an unusual size of the hand adds to the golden energy."""
+    return _SIZE_WEIGHT * (np.log(scale / settings.scale_mean) / settings.scale_spread) ** 2
 
 
 def _random_genes(hand: Hand, places: Array, settings: SearchSettings, rng: np.random.Generator) -> _Genes:
@@ -198,7 +203,9 @@ def _offspring(
         digits[:, 4 + 4 * finger] += _SPREAD[finger] * fan
     for columns in digit_columns(hand):
         touched = rng.random(count) < 0.3
-        digits[np.ix_(touched, columns)] += rng.normal(scale=0.08 + 0.5 * shrink, size=(int(touched.sum()), len(columns)))
+        digits[np.ix_(touched, columns)] += rng.normal(
+            scale=0.08 + 0.5 * shrink, size=(int(touched.sum()), len(columns))
+        )
     turns = _shift_fingers(hand, digits, parents.turns[first], rng)
     turned = rng.random((count, 1)) < 0.5
     turn = Rotation.from_rotvec(turned * rng.normal(scale=0.03 + 0.4 * shrink, size=(count, 3)))
@@ -209,7 +216,7 @@ def _offspring(
     if settings.scale_spread > 0:
         resized = rng.random(count) < 0.4
         scales = scales * np.exp(resized * rng.normal(scale=0.01 + 0.06 * shrink, size=count))
-        low = settings.scale_mean * np.exp(-3 * settings.scale_spread)
+        low = settings.scale_mean * np.exp(-2.5 * settings.scale_spread)
         scales = np.clip(scales, low, settings.scale_mean**2 / low)
     return _Genes(places, turns, np.clip(digits, hand.limits[6:, 0], hand.limits[6:, 1]), scales)
 

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
 _FIRST_EFFORT = 3.0
+_NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a lost hand is believed in, and how much it grows a frame
 
 
 class Tracking(NamedTuple):
@@ -61,6 +62,8 @@ class TrackState(NamedTuple):
         history: recent golden energies of good frames.
         bad: bad frames in a row.
         fresh: whether the pose was just found and no frame has refined it.
+        golden: golden energy of the last estimate; 1 when there is none.
+        missing: frames since the hand was lost.
     """
 
     filter: smart.State
@@ -68,6 +71,8 @@ class TrackState(NamedTuple):
     history: tuple[float, ...]
     bad: int
     fresh: bool
+    golden: float
+    missing: int
 
 
 class TrackedFrame(NamedTuple):
@@ -118,7 +123,7 @@ def begin(
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
     state = smart.start(tracking.hand, pose, reference, time_, count)
-    return TrackState(state, False, (), 0, True)
+    return TrackState(state, False, (), 0, True, 1.0, 0)
 
 
 def track_frame(
@@ -137,41 +142,59 @@ def track_frame(
     """
     began = time.perf_counter()
     rng = np.random.default_rng([tracking.seed, frame.index])
-    recovered = False
-    if state.lost:
-        found = recover(frame, tracking.hand, tracking.start.golden, rng)
-        if found is None:
-            return state, _lost(tracking, state, frame, began)
-        recovered = True
-        state = _restart(tracking, found, np.eye(3), frame.time - 1.0 / 30.0)
+    was_lost = state.lost
+    if was_lost:
+        state = _sought(tracking, state, frame, rng)
+    searched = time.perf_counter()
     observation = observe(frame, state.filter.estimate[:3], reach_of(tracking.hand))
     observed = time.perf_counter()
     if observation.is_empty:
-        state = state._replace(lost=True)
+        state = state._replace(lost=True, missing=state.missing + 1)
         return state, _lost(tracking, state, frame, began)
     filter_state, info = TRACKERS[tracking.tracker].step(
         rng, state.filter, observation, tracking.hand, tracking.settings,
         spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
     )  # fmt: skip
-    new = _judged(state, filter_state, info)
+    new = _judged(tracking, state, filter_state, info)
     joints = joints_of(tracking.hand, info.estimate, info.reference)
-    timings = {"observe": observed - began, **info.timings}
+    timings = {"search": searched - began, "observe": observed - searched, **info.timings}
     seconds = time.perf_counter() - began
     result = TrackedFrame(
-        frame.index, frame.time, info.estimate, info.reference, joints, new.lost, recovered,
+        frame.index, frame.time, info.estimate, info.reference, joints, new.lost, was_lost and not new.lost,
         info.estimate_log_likelihood, info.ess, info.estimate_golden, info.estimate_overlap, seconds, timings,
         info, observation,
     )  # fmt: skip
     return new, result
 
 
-def _judged(state: TrackState, filter_state: smart.State, info: smart.StepInfo) -> TrackState:
-    """Notice a loss: several frames in a row that the estimate's render explains much worse than usual."""
-    usual = float(np.median(state.history)) if state.history else info.estimate_golden
-    bad = info.estimate_golden > max(1.6 * usual + 0.12, 0.45) or info.estimate_overlap < 0.3
+def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.Generator) -> TrackState:
+    """Search for a lost hand; the state goes on from where it was when nothing better is found."""
+    limit = min(_believable(state, tracking), 0.8 * state.golden)
+    within = _NEAR + _STRIDE * state.missing
+    found = recover(frame, tracking.hand, limit, state.filter.estimate[:3], within, rng)
+    if found is None:
+        return state
+    return _restart(tracking, found, np.eye(3), frame.time - 1.0 / 30.0)._replace(history=state.history, lost=True)
+
+
+def _usual(state: TrackState, tracking: Tracking) -> float:
+    """Golden energy that the hand is tracked with when all is well."""
+    return float(np.median(state.history)) if state.history else tracking.start.golden
+
+
+def _believable(state: TrackState, tracking: Tracking) -> float:
+    """Golden energy under which a hand that was lost counts as found."""
+    return max(1.3 * _usual(state, tracking) + 0.06, 0.3)
+
+
+def _judged(tracking: Tracking, state: TrackState, filter_state: smart.State, info: smart.StepInfo) -> TrackState:
+    """Notice a loss, frames in a row that the estimate's render explains much worse than usual, and its end."""
+    golden = info.estimate_golden
+    bad = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
     count = state.bad + 1 if bad else 0
-    history = state.history if bad else (*state.history, info.estimate_golden)[-_HISTORY:]
-    return TrackState(filter_state, count >= _PATIENCE, history, count, False)
+    history = state.history if bad or state.lost else (*state.history, golden)[-_HISTORY:]
+    lost = golden > _believable(state, tracking) if state.lost else count >= _PATIENCE
+    return TrackState(filter_state, lost, history, count, False, golden, state.missing + 1 if lost else 0)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:

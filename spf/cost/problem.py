@@ -119,7 +119,7 @@ def correspondences(problem: Problem, pose: Array) -> Correspondences:
     """Pose the hand (D,), and find what the camera sees of it and which vertex each observed pixel belongs to."""
     hand, arrays = problem.hand, problem.observation.arrays
     count = len(hand.skin.vertices)
-    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone))
+    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone), hand.dofs)
     vertices, normals = np.empty((count, 3)), np.empty((count, 3))
     projected, coarse = np.empty((count, 3), np.float32), np.empty((len(hand.proxy.vertices), 3), np.float32)
     depth, visible = np.empty(arrays.grid_depth.shape, np.float32), np.empty(count, np.int32)
@@ -129,7 +129,7 @@ def correspondences(problem: Problem, pose: Array) -> Correspondences:
     )  # fmt: skip
     matches = np.empty(len(problem.data_pool), np.int32)
     match_pixels(
-        vertices, normals, visible, seen, arrays, work.frames, np.ascontiguousarray(pose), problem.data_pool,
+        vertices, normals, visible, seen, arrays, work.chain.bones, np.ascontiguousarray(pose), problem.data_pool,
         problem.match_radius, matches,
     )  # fmt: skip
     return Correspondences(vertices, normals, visible[:seen].copy(), matches)

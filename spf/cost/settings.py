@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 from spf.kernels.cost import CostWeights
 from spf.settings import Settings, setting
@@ -11,7 +10,9 @@ from spf.settings import Settings, setting
 __all__ = ["CostSettings"]
 
 _COST = "Cost"
-LENGTH = 0.01  # ℓ: makes E dimensionless and keeps the meaning of the paper's k
+LENGTH = 0.01  # ℓ, m: makes E dimensionless and keeps the meaning of the paper's k
+# Robust scales, m, of model points behind and in front of the surface, and of point-to-point distances.
+BEHIND, FRONT, PULL = 0.015, 0.03, 0.03
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,9 +41,9 @@ class CostSettings(Settings):
             points=float(self.points),
             length=LENGTH,
             normal=float(self.k),
-            behind=0.015 if self.robust else math.inf,
-            front=0.03 if self.robust else math.inf,
-            pull=0.03 if self.robust else math.inf,
+            behind=1.0 / BEHIND**2 if self.robust else 0.0,
+            front=1.0 / FRONT**2 if self.robust else 0.0,
+            pull=1.0 / PULL**2 if self.robust else 0.0,
             background=float(self.background),
             coverage=float(self.coverage),
             collision=float(self.collision),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
@@ -31,16 +32,17 @@ def digit_spheres(hand: Hand) -> Spheres:
             middle = np.array([*(0.5 * (ring[:, :2].min(axis=0) + ring[:, :2].max(axis=0))), place])
             radius = float(np.median(np.linalg.norm(ring[:, :2] - middle[:2], axis=1)))
             bones.append(bone)
-            centres.append(bind[bone, :, :3] @ middle + bind[bone, :, 3])
+            centres.append(middle)
             radii.append(_ALLOWANCE * radius)
             digits.append((bone - 1) // 3)
-    pairs = [
-        (a, b)
-        for a in range(len(bones))
-        for b in range(a + 1, len(bones))
-        if (digits[b] - digits[a] == 1 and digits[a] > 0)
-        or (digits[a] == 0 and digits[b] in (1, 2, 3) and bones[a] > 1)
-    ]
-    return Spheres(
-        np.array(bones, np.int32), np.array(centres), np.array(radii), np.array(pairs, np.int32).reshape(-1, 2)
-    )
+    digit = np.array(digits)
+    partners = [_partners(digit, own, metacarpal=bone == 1) for own, bone in zip(digits, bones, strict=True)]
+    return Spheres(np.array(bones, np.int32), np.array(centres), np.array(radii), np.array(partners, np.int32))
+
+
+def _partners(digit: NDArray[np.int_], own: int, *, metacarpal: bool) -> tuple[int, int]:
+    """Range of the spheres that one of digit ``own`` can meet; the thumb's metacarpal is part of the palm."""
+    if metacarpal or own == digit.max():
+        return 0, 0
+    met = np.flatnonzero((digit >= 1) & (digit <= 3) if own == 0 else digit == own + 1)
+    return int(met[0]), int(met[-1]) + 1

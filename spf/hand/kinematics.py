@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from spf.errors import HandError
 from spf.hand.model import Hand
-from spf.kernels import kinematics as kernels
+from spf.kernels.kinematics import Chain, bone_twists, joint_gradient, make_chain, pose_bones
+from spf.kernels.skinning import skin, skin_forces, skin_velocities
 
 __all__ = ["PosedHand", "angles_of", "joints_of", "pose_hand", "rotation_about", "skin_jvp", "skin_vjp"]
 
@@ -32,26 +33,24 @@ class PosedHand(NamedTuple):
     frames: Array
 
 
-class _Chain(NamedTuple):
-    pose: Array
-    frames: Array
-    axes: Array
-    matrices: Array
-
-
-def _chain(hand: Hand, pose: ArrayLike, reference: ArrayLike | None) -> _Chain:
+def _chain(hand: Hand, pose: ArrayLike, reference: ArrayLike | None) -> tuple[Array, Chain]:
+    """Check a pose, and pose the bones."""
     p = np.ascontiguousarray(pose, dtype=np.float64)
     if p.shape != (hand.dofs,):
         raise HandError(f"A pose of this hand has {hand.dofs} entries, not {p.shape}.")
     if not np.isfinite(p).all():
         raise HandError("The pose holds a value that is not a finite number.")
     rotation = np.eye(3) if reference is None else np.ascontiguousarray(reference, dtype=np.float64)
-    bones = len(hand.skeleton.parent)
-    frames, matrices = np.empty((bones, 3, 4)), np.empty((bones, 3, 4))
-    axes = np.empty((3 + len(hand.skeleton.revolute_bone), 3))
-    kernels.pose_bones(hand.skeleton, p, rotation, frames, axes)
-    kernels.skinning_matrices(hand.skeleton, frames, matrices)
-    return _Chain(p, frames, axes, matrices)
+    chain = make_chain(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone))
+    pose_bones(hand.skeleton, p, rotation, chain)
+    return p, chain
+
+
+def _frames(chain: Chain, pose: Array) -> Array:
+    """T_camera_bone (B, 3, 4)."""
+    frames = chain.bones[:, :12].reshape(-1, 3, 4)
+    frames[:, :, 3] += pose[:3]
+    return frames
 
 
 def pose_hand(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -> PosedHand:
@@ -65,20 +64,17 @@ def pose_hand(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -
     Raises:
         HandError: the pose has the wrong length or is not finite.
     """
-    chain = _chain(hand, pose, reference)
+    p, chain = _chain(hand, pose, reference)
     vertices, normals = np.empty_like(hand.skin.vertices), np.empty_like(hand.skin.normals)
-    kernels.skin(hand.skin, chain.matrices, chain.pose[:3], vertices, normals)
-    frames = chain.frames.copy()
-    frames[:, :, 3] += chain.pose[:3]
+    skin(hand.skin, chain, p, vertices, normals)
+    frames = _frames(chain, p)
     return PosedHand(vertices, normals, _place_joints(hand, frames), frames)
 
 
 def joints_of(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -> Array:
     """Return the 21 joints (21, 3) of a pose, m; cheaper than :func:`pose_hand`."""
-    chain = _chain(hand, pose, reference)
-    frames = chain.frames.copy()
-    frames[:, :, 3] += chain.pose[:3]
-    return _place_joints(hand, frames)
+    p, chain = _chain(hand, pose, reference)
+    return _place_joints(hand, _frames(chain, p))
 
 
 def _place_joints(hand: Hand, frames: Array) -> Array:
@@ -112,18 +108,12 @@ def skin_jvp(
     One pass over the bones and one over the points; no Jacobian is built. The normals' part includes the derivative
     of their normalisation.
     """
-    chain = _chain(hand, pose, reference)
+    _, chain = _chain(hand, pose, reference)
     v = np.ascontiguousarray(direction, dtype=np.float64)
-    twists, velocities = np.empty((len(chain.frames), 6)), np.empty_like(chain.matrices)
-    kernels.bone_twists(hand.skeleton, chain.frames, chain.axes, v, twists)
-    kernels.skinning_velocities(chain.matrices, twists, velocities)
-    blended, blended_rate = _blend(hand, chain.matrices), _blend(hand, velocities)
-    points_rate = _apply(blended_rate, hand.skin.vertices) + blended_rate[:, :, 3] + v[:3]
-    raw = _apply(blended, hand.skin.normals)
-    length = np.linalg.norm(raw, axis=1, keepdims=True)
-    raw_rate = _apply(blended_rate, hand.skin.normals) / length
-    unit = raw / length
-    return points_rate, raw_rate - unit * np.sum(unit * raw_rate, axis=1, keepdims=True)
+    point_rates, normal_rates = np.empty_like(hand.skin.vertices), np.empty_like(hand.skin.normals)
+    bone_twists(hand.skeleton, v, chain)
+    skin_velocities(hand.skin, chain, v, point_rates, normal_rates)
+    return point_rates, normal_rates
 
 
 def skin_vjp(
@@ -134,27 +124,10 @@ def skin_vjp(
     reference: ArrayLike | None = None,
 ) -> Array:
     """``J_Fᵀ u``: gradient (D,) of ``Σ u_x·x̂ + u_n·n̂`` over all vertices, for forces (V, 3) on points and normals."""
-    chain = _chain(hand, pose, reference)
-    u_x, u_n = np.asarray(point_forces, dtype=np.float64), np.asarray(normal_forces, dtype=np.float64)
-    raw = _apply(_blend(hand, chain.matrices), hand.skin.normals)
-    length = np.linalg.norm(raw, axis=1, keepdims=True)
-    unit = raw / length
-    u_n = (u_n - unit * np.sum(unit * u_n, axis=1, keepdims=True)) / length
-    homogeneous = np.hstack([hand.skin.vertices, np.ones((len(hand.skin.vertices), 1))])
-    per_point = u_x[:, :, None] * homogeneous[:, None, :]
-    per_point[:, :, :3] += u_n[:, :, None] * hand.skin.normals[:, None, :]
-    gathered = np.zeros_like(chain.matrices)
-    weighted = hand.skin.influence_weight[:, :, None, None] * per_point[:, None]
-    np.add.at(gathered, hand.skin.influence_bone, weighted)
-    gradient = np.zeros(hand.dofs)
-    wrenches = np.empty((len(gathered), 6))
-    kernels.joint_gradient(hand.skeleton, chain.frames, chain.axes, chain.matrices, gathered, wrenches, gradient)
+    _, chain = _chain(hand, pose, reference)
+    u_x = np.ascontiguousarray(point_forces, dtype=np.float64)
+    u_n = np.ascontiguousarray(normal_forces, dtype=np.float64)
+    skin_forces(hand.skin, chain, u_x, u_n)
+    gradient, nothing = np.zeros(hand.dofs), np.zeros(hand.dofs)
+    joint_gradient(hand.skeleton, chain, gradient, nothing)
     return gradient
-
-
-def _blend(hand: Hand, matrices: Array) -> Array:
-    return np.einsum("vi,vijk->vjk", hand.skin.influence_weight, matrices[hand.skin.influence_bone])
-
-
-def _apply(matrices: Array, vectors: Array) -> Array:
-    return np.einsum("vij,vj->vi", matrices[:, :, :3], vectors)

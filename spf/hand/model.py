@@ -29,7 +29,8 @@ from scipy.spatial import cKDTree
 
 from spf.errors import HandError
 from spf.hand.glb import SkinnedMesh, read_glb
-from spf.kernels.kinematics import Skeleton, Skin
+from spf.kernels.kinematics import Skeleton
+from spf.kernels.skinning import MOST_INFLUENCES, SHARE_COLUMNS, Skin
 
 __all__ = ["BONES", "DOF_NAMES", "FINGERS", "FREE_DIP_NAMES", "Hand", "load_hand", "mirrored", "vertex_normals"]
 
@@ -55,7 +56,6 @@ DOF_NAMES: tuple[str, ...] = (
 FREE_DIP_NAMES: tuple[str, ...] = tuple(f"{finger}_dip_flexion" for finger in FINGERS[1:])
 
 DIP_PER_PIP = 2.0 / 3.0  # intra-finger constraint
-_MAX_INFLUENCES = 4
 _PROXY_FACES = 560  # triangles of the coarse copy: 1-2 mm off the skin, drawn in 20 µs
 _MIDDLE_TIP = 12
 
@@ -137,8 +137,8 @@ class Hand(NamedTuple):
         )
         return self._replace(
             skeleton=skeleton,
-            skin=self.skin._replace(vertices=self.skin.vertices * factor),
-            proxy=self.proxy._replace(vertices=self.proxy.vertices * factor),
+            skin=_scaled_skin(self.skin, factor),
+            proxy=_scaled_skin(self.proxy, factor),
             joint_offset=self.joint_offset * factor,
         )
 
@@ -175,14 +175,14 @@ def build_hand(mesh: SkinnedMesh, side: Side, *, free_dip: bool = False) -> Hand
     """Build the hand model from a skinned mesh: 16 bones, their revolute axes, limits and skin.
 
     Raises:
-        HandError: some of the 25 WebXR joints are missing.
+        HandError: some of the 25 WebXR joints are missing, or a joint is scaled.
     """
     index = {name: number for number, name in enumerate(mesh.joint_names)}
     needed = [_webxr_joint(bone) for bone in BONES] + [f"{_webxr_finger(finger)}-tip" for finger in FINGERS]
     missing = [name for name in needed if name not in index]
     if missing:
         raise HandError(f"The hand model lacks the WebXR joints {', '.join(missing)}; name its joints as WebXR does.")
-    bind = np.array([mesh.bind[index[_webxr_joint(bone)]] for bone in BONES])
+    bind = _rigid(np.array([mesh.bind[index[_webxr_joint(bone)]] for bone in BONES]))
     joint_bone, joint_offset = _joints(mesh, index, bind)
     weights = _fold_weights(mesh, index)
     return assemble_hand(
@@ -222,12 +222,12 @@ def assemble_hand(
         revolute_gain=np.array([r[3] for r in revolutes]),
         revolute_dof=np.array([r[2] for r in revolutes], dtype=np.int32),
     )
-    skin = _skin(vertices, faces, weights)
+    skin = _skin(vertices, faces, weights, skeleton.inverse_bind)
     proxy_vertices, proxy_faces = _simplified(vertices, faces)
     # what lies beyond the wrist is arm: it bends as the palm does not
     proxy_faces = np.ascontiguousarray(proxy_faces[(proxy_vertices[proxy_faces, 2] < bind[0, 2, 3]).any(axis=1)])
     nearest = cKDTree(vertices).query(proxy_vertices)[1]
-    proxy = _skin(proxy_vertices, proxy_faces, weights[nearest])
+    proxy = _skin(proxy_vertices, proxy_faces, weights[nearest], skeleton.inverse_bind)
     names = DOF_NAMES + (FREE_DIP_NAMES if free_dip else ())
     digit = np.array([0, *([1] * 3), *([2] * 3), *([3] * 3), *([4] * 3), *([5] * 3)], dtype=np.int32)
     digits = digit[skin.influence_bone[:, 0]]
@@ -260,18 +260,38 @@ def bone_weights(hand: Hand) -> NDArray[np.float64]:
     return weights
 
 
-def _skin(vertices: NDArray[np.float64], faces: NDArray[np.int32], weights: NDArray[np.float64]) -> Skin:
+def _skin(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    weights: NDArray[np.float64],
+    inverse_bind: NDArray[np.float64],
+) -> Skin:
     """Keep the four strongest influences of every vertex."""
-    order = np.argsort(-weights, axis=1)[:, :_MAX_INFLUENCES]
+    order = np.argsort(-weights, axis=1)[:, :MOST_INFLUENCES]
     strongest = np.take_along_axis(weights, order, axis=1)
     strongest /= strongest.sum(axis=1, keepdims=True)
+    normals = vertex_normals(vertices, faces)
+    shares = np.zeros((*order.shape, SHARE_COLUMNS))
+    to_bone = inverse_bind[order]
+    shares[..., :3] = np.einsum("vcij,vj->vci", to_bone[..., :3], vertices) + to_bone[..., 3]
+    shares[..., 3] = 1.0
+    shares[..., 4:7] = np.einsum("vcij,vj->vci", to_bone[..., :3], normals)
+    shares *= strongest[..., None]
+    shares[:, :-1, 7] = strongest[:, 1:] > 0
     return Skin(
         vertices=np.ascontiguousarray(vertices),
-        normals=vertex_normals(vertices, faces),
+        normals=normals,
         influence_count=(strongest > 0).sum(axis=1).astype(np.int32),
         influence_bone=order.astype(np.int32),
         influence_weight=strongest,
+        shares=shares.reshape(-1, SHARE_COLUMNS),
     )
+
+
+def _scaled_skin(skin: Skin, factor: float) -> Skin:
+    """Return a skin enlarged by a factor about the model's origin, with bones that are enlarged, too."""
+    along = np.array([factor, factor, factor, 1.0, 1.0, 1.0, 1.0, 1.0])
+    return skin._replace(vertices=skin.vertices * factor, shares=skin.shares * along)
 
 
 def _simplified(
@@ -295,6 +315,16 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> N
 def _relative(parent: NDArray[np.float64], child: NDArray[np.float64]) -> NDArray[np.float64]:
     rotation = parent[:, :3].T @ child[:, :3]
     return np.hstack([rotation, (parent[:, :3].T @ (child[:, 3] - parent[:, 3]))[:, None]])
+
+
+def _rigid(bind: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Make the rotations of bind matrices (B, 4, 4) exact: files hold them in single precision."""
+    left, stretch, right = np.linalg.svd(bind[:, :3, :3])
+    if np.abs(stretch - 1.0).max() > 1e-3 or np.linalg.det(bind[:, :3, :3]).min() < 0.0:
+        raise HandError("The joints of the hand model are scaled or mirrored; apply their scale and export it again.")
+    exact = bind.copy()
+    exact[:, :3, :3] = left @ right
+    return exact
 
 
 def _parents() -> NDArray[np.int32]:

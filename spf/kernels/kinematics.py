@@ -1,14 +1,13 @@
-"""Forward kinematics, linear blend skinning and their derivative products (spec 2; eq. 1, 2, 14, 22).
+"""Forward kinematics of the bones and its derivative products (spec 2; eq. 1, 14, 22).
 
 All positions here are relative to the palm's centre ``p[0:3]`` until a point is placed in the camera frame: this keeps
-torques well scaled. A bone's skinning matrix is ``S = M · B⁻¹`` (3×4). With ``A = Σ w S`` blended per point,
+torques well scaled. Every degree of freedom is a rotation about a line, written as a screw ``ξ = (axis, origin × axis)``.
+It serves both products, which never build a 26-column Jacobian:
 
-    x̂ = A [v; 1] + p[0:3]          n̂ = A n / ‖A n‖
+    JVP:  twist of a bone  (ω, ν) = Σ ξ_d v_d    over the rotations above it; a point at x moves with ω × x + ν
+    VJP:  g_d = ξ_d · (torque, force)            of all bones below it, summed up the tree
 
-and both derivative products act on the small matrices S instead of on a 26-column Jacobian per point:
-
-    JVP:  Ṡ_b = [ω_b]× S_b + [0 | ν_b]           twist (ω, ν) propagated down the tree
-    VJP:  G_b = Σ_points w (u_x [v; 1]ᵀ + u_n [n; 0]ᵀ)   gathered; then force and torque summed up the tree
+All that is known of a bone lies in one row of a table, so that the loops over points have one place to read and write.
 """
 
 from __future__ import annotations
@@ -17,21 +16,28 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from spf.kernels.compiling import allocating, part
+
 __all__ = [
+    "BONE_COLUMNS",
+    "FRAME",
+    "GRADIENT",
+    "PRODUCT",
+    "TWIST",
+    "Chain",
     "Skeleton",
-    "Skin",
     "bone_twists",
     "joint_gradient",
+    "make_chain",
     "pose_bones",
-    "skin",
-    "skinning_matrices",
-    "skinning_velocities",
 ]
 
 Array = NDArray[np.float64]
+
+# Columns of a bone's row: T_palm_bone (3×4, row by row), its twist, and two wrenches (torque, force).
+FRAME, TWIST, GRADIENT, PRODUCT, BONE_COLUMNS = 0, 12, 18, 24, 30
 
 
 class Skeleton(NamedTuple):
@@ -43,7 +49,7 @@ class Skeleton(NamedTuple):
         inverse_bind: (B, 3, 4) T_bone_model in the bind pose.
         rest: (B, 3, 4) T_parent_bone in the bind pose; the palm's is relative to the model frame.
         revolute_bone, revolute_axis, revolute_dof: (R,) a rotation of that bone about its own axis 0-2, driven by a
-            pose entry; rotations of a bone follow each other in this order.
+            pose entry; in the order of the bones, and of a bone in the order of application.
         revolute_gain: (R,) radians of rotation per radian of the pose entry (sign of the side; 2/3 for a tied DIP).
     """
 
@@ -57,177 +63,183 @@ class Skeleton(NamedTuple):
     revolute_dof: NDArray[np.int32]
 
 
-class Skin(NamedTuple):
-    """Points that bones move, as flat arrays: V points, at most 4 influences a point.
+class Chain(NamedTuple):
+    """The posed bones; made once, filled for every pose.
 
     Attributes:
-        vertices, normals: (V, 3) bind pose, model frame.
-        influence_count: (V,) number of bones that move a vertex.
-        influence_bone, influence_weight: (V, 4) which, and how much, strongest first.
+        bones: (B, BONE_COLUMNS) frames T_palm_bone (camera orientation, from the palm's centre), twists, wrenches.
+        screws: (3 + R, 6) of the three palm angles, then of every revolute.
+        angles, cosines, sines: (R,) of the revolutes.
     """
 
-    vertices: Array
-    normals: Array
-    influence_count: NDArray[np.int32]
-    influence_bone: NDArray[np.int32]
-    influence_weight: Array
+    bones: Array
+    screws: Array
+    angles: Array
+    cosines: Array
+    sines: Array
 
 
-@njit(cache=True, nogil=True, fastmath=True, inline="always")
-def _turn_columns(rotation, axis, angle):
-    """Right-multiply a rotation by a rotation about one of its own axes: two columns mix."""
-    c, s = math.cos(angle), math.sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    for row in range(3):
-        a, b = rotation[row, i], rotation[row, j]
-        rotation[row, i] = c * a + s * b
-        rotation[row, j] = c * b - s * a
+@allocating
+def make_chain(bones: int, revolutes: int) -> Chain:
+    """Allocate a Chain."""
+    return Chain(
+        np.zeros((bones, BONE_COLUMNS)),
+        np.zeros((3 + revolutes, 6)),
+        np.zeros(revolutes),
+        np.zeros(revolutes),
+        np.zeros(revolutes),
+    )
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def pose_bones(skeleton, pose, reference, frames, axes):
-    """Forward kinematics: frames of all bones and the world axes of all rotations.
+@part
+def pose_bones(skeleton: Skeleton, pose: Array, reference: Array, chain: Chain) -> None:
+    """Forward kinematics: the frames of all bones and the screws of all rotations, for a pose (D,) and R_ref (3, 3)."""
+    parents, rest = skeleton.parent, skeleton.rest
+    owners, axes = skeleton.revolute_bone, skeleton.revolute_axis
+    bones, screws, cosines, sines = chain.bones, chain.screws, chain.cosines, chain.sines
+    _cosines(skeleton.revolute_gain, skeleton.revolute_dof, pose, chain.angles, cosines, sines)
+    _pose_palm(pose, reference, rest, bones, screws)
+    turn = 0
+    for b in range(1, parents.shape[0]):
+        p = np.uint32(parents[b])
+        for i in range(0, 12, 4):
+            x, y, z = bones[p, i], bones[p, i + 1], bones[p, i + 2]
+            for j in range(4):
+                bones[b, i + j] = x * rest[b, 0, j] + y * rest[b, 1, j] + z * rest[b, 2, j]
+            bones[b, i + 3] += bones[p, i + 3]
+        while turn < owners.shape[0] and owners[turn] == b:
+            axis = np.uint32(axes[turn])
+            _screw(bones, b, axis, screws, turn + 3)
+            _turn_columns(bones, b, axis, cosines[turn], sines[turn])
+            turn += 1
+
+
+@part
+def _cosines(gains: Array, dofs: NDArray[np.int32], pose: Array, angles: Array, cosines: Array, sines: Array) -> None:
+    """cos and sin of all revolutes, in loops that the compiler vectorises."""
+    for r in range(gains.shape[0]):
+        angles[r] = gains[r] * pose[np.uint32(dofs[r])]
+    for r in range(gains.shape[0]):
+        cosines[r], sines[r] = _cos_sin(angles[r])
+
+
+@part
+def _cos_sin(angle: float) -> tuple[float, float]:
+    """cos and sin to 1e-15 for angles of a few turns: Taylor series of what remains after removing quarter turns."""
+    quarters = math.floor(angle * (2.0 / math.pi) + 0.5)
+    x = angle - quarters * (0.5 * math.pi)
+    z = x * x
+    s = 1 / 362880 + z * (-1 / 39916800 + z * (1 / 6227020800 - z / 1307674368000))
+    s = x + x * z * (-1 / 6 + z * (1 / 120 + z * (-1 / 5040 + z * s)))
+    c = -1 / 3628800 + z * (1 / 479001600 + z * (-1 / 87178291200 + z / 20922789888000))
+    c = 1.0 + z * (-1 / 2 + z * (1 / 24 + z * (-1 / 720 + z * (1 / 40320 + z * c))))
+    quadrant = int(quarters) & 3
+    c, s = (s, c) if quadrant & 1 else (c, s)
+    return (-c if quadrant == 1 or quadrant == 2 else c), (-s if quadrant >= 2 else s)
+
+
+@part
+def _pose_palm(pose: Array, reference: Array, rest: Array, bones: Array, screws: Array) -> None:
+    """Set the palm's frame to Rx(a) Ry(b) Rz(c) R_ref, and the screws of the three angles."""
+    ca, sa = _cos_sin(pose[3])
+    cb, sb = _cos_sin(pose[4])
+    cc, sc = _cos_sin(pose[5])
+    screws[:3] = 0.0
+    screws[0, 0] = 1.0
+    screws[1, 1], screws[1, 2] = ca, sa
+    screws[2, 0], screws[2, 1], screws[2, 2] = sb, -sa * cb, ca * cb
+    for j in range(4):
+        x, y, z = rest[0, 0, j], rest[0, 1, j], rest[0, 2, j]
+        x, y, z = (
+            reference[0, 0] * x + reference[0, 1] * y + reference[0, 2] * z,
+            reference[1, 0] * x + reference[1, 1] * y + reference[1, 2] * z,
+            reference[2, 0] * x + reference[2, 1] * y + reference[2, 2] * z,
+        )
+        x, y = cc * x - sc * y, sc * x + cc * y
+        x, z = cb * x + sb * z, cb * z - sb * x
+        y, z = ca * y - sa * z, sa * y + ca * z
+        bones[0, j], bones[0, 4 + j], bones[0, 8 + j] = x, y, z
+
+
+@part
+def _screw(bones: Array, b: int, axis: int, screws: Array, s: int) -> None:
+    """Screw of the rotation of a bone about one of its own axes as it is now turned."""
+    ax, ay, az = bones[b, axis], bones[b, 4 + axis], bones[b, 8 + axis]
+    ox, oy, oz = bones[b, 3], bones[b, 7], bones[b, 11]
+    screws[s, 0], screws[s, 1], screws[s, 2] = ax, ay, az
+    screws[s, 3], screws[s, 4], screws[s, 5] = oy * az - oz * ay, oz * ax - ox * az, ox * ay - oy * ax
+
+
+@part
+def _turn_columns(bones: Array, b: int, axis: int, c: float, s: float) -> None:
+    """Right-multiply a bone's rotation by one about its own axis: two columns mix."""
+    i, j = np.uint32((axis + 1) % 3), np.uint32((axis + 2) % 3)
+    for row in range(0, 12, 4):
+        x, y = bones[b, row + i], bones[b, row + j]
+        bones[b, row + i] = c * x + s * y
+        bones[b, row + j] = c * y - s * x
+
+
+@part
+def bone_twists(skeleton: Skeleton, direction: Array, chain: Chain) -> None:
+    """Set the twists of all bones about the palm's centre, for a velocity (D,) of the pose (the tree part of J_F v).
+
+    The palm's own translation is no part of them.
+    """
+    parents, owners = skeleton.parent, skeleton.revolute_bone
+    gains, dofs = skeleton.revolute_gain, skeleton.revolute_dof
+    bones, screws = chain.bones, chain.screws
+    a, b, c = direction[3], direction[4], direction[5]
+    for i in range(6):
+        bones[0, TWIST + i] = a * screws[0, i] + b * screws[1, i] + c * screws[2, i]
+    turn = 0
+    for bone in range(1, parents.shape[0]):
+        p = np.uint32(parents[bone])
+        x, y, z = bones[p, TWIST], bones[p, TWIST + 1], bones[p, TWIST + 2]
+        u, v, w = bones[p, TWIST + 3], bones[p, TWIST + 4], bones[p, TWIST + 5]
+        while turn < owners.shape[0] and owners[turn] == bone:
+            rate = gains[turn] * direction[np.uint32(dofs[turn])]
+            x += rate * screws[turn + 3, 0]
+            y += rate * screws[turn + 3, 1]
+            z += rate * screws[turn + 3, 2]
+            u += rate * screws[turn + 3, 3]
+            v += rate * screws[turn + 3, 4]
+            w += rate * screws[turn + 3, 5]
+            turn += 1
+        bones[bone, TWIST], bones[bone, TWIST + 1], bones[bone, TWIST + 2] = x, y, z
+        bones[bone, TWIST + 3], bones[bone, TWIST + 4], bones[bone, TWIST + 5] = u, v, w
+
+
+@part
+def joint_gradient(skeleton: Skeleton, chain: Chain, gradient: Array, product: Array) -> None:
+    """Turn the wrenches on the bones into gradients of the pose (the tree part of J_Fᵀ u), for both wrenches.
 
     Args:
-        skeleton: Skeleton.
-        pose: (D,).
-        reference: (3, 3) R_ref.
-        frames: (B, 3, 4) out: T_palm_bone, camera orientation, relative to the palm's centre.
-        axes: (3 + R, 3) out: unit axes of the three palm angles, then of every revolute.
+        skeleton: the bones.
+        chain: with wrenches about the palm's centre; afterwards a bone's hold those of all bones below it, too.
+        gradient, product: (D,) to which the two are **added**.
     """
-    turn = np.eye(3)
-    for k in range(3):
-        for row in range(3):
-            axes[k, row] = turn[row, k]
-        _turn_columns(turn, k, pose[3 + k])
-    palm = turn @ reference
-    count = 0
-    for bone in range(skeleton.parent.shape[0]):
-        parent = skeleton.parent[bone]
-        for i in range(3):
-            for j in range(4):
-                total = 0.0
-                for m in range(3):
-                    above = palm[i, m] if parent < 0 else frames[parent, i, m]
-                    total += above * skeleton.rest[bone, m, j]
-                frames[bone, i, j] = total
-            if parent >= 0:
-                frames[bone, i, 3] += frames[parent, i, 3]
-        while count < skeleton.revolute_bone.shape[0] and skeleton.revolute_bone[count] == bone:
-            axis = skeleton.revolute_axis[count]
-            for row in range(3):
-                axes[3 + count, row] = frames[bone, row, axis]
-            _turn_columns(frames[bone], axis, skeleton.revolute_gain[count] * pose[skeleton.revolute_dof[count]])
-            count += 1
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def skinning_matrices(skeleton, frames, matrices):
-    """S = M B⁻¹ of every bone, (B, 3, 4)."""
-    for bone in range(frames.shape[0]):
-        for i in range(3):
-            for j in range(4):
-                total = frames[bone, i, 3] if j == 3 else 0.0
-                for m in range(3):
-                    total += frames[bone, i, m] * skeleton.inverse_bind[bone, m, j]
-                matrices[bone, i, j] = total
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def bone_twists(skeleton, frames, axes, direction, twists):
-    """Twists (B, 6) = (ω, ν about the palm's centre) of all bones for a velocity of the pose (the tree part of J_F v)."""
-    count = 0
-    for bone in range(skeleton.parent.shape[0]):
-        parent = skeleton.parent[bone]
-        if parent < 0:
-            for c in range(3):
-                twists[bone, c] = axes[0, c] * direction[3] + axes[1, c] * direction[4] + axes[2, c] * direction[5]
-                twists[bone, 3 + c] = 0.0
-        else:
-            for c in range(6):
-                twists[bone, c] = twists[parent, c]
-        while count < skeleton.revolute_bone.shape[0] and skeleton.revolute_bone[count] == bone:
-            rate = skeleton.revolute_gain[count] * direction[skeleton.revolute_dof[count]]
-            ax, ay, az = axes[3 + count, 0] * rate, axes[3 + count, 1] * rate, axes[3 + count, 2] * rate
-            ox, oy, oz = frames[bone, 0, 3], frames[bone, 1, 3], frames[bone, 2, 3]
-            twists[bone, 0] += ax
-            twists[bone, 1] += ay
-            twists[bone, 2] += az
-            twists[bone, 3] += oy * az - oz * ay
-            twists[bone, 4] += oz * ax - ox * az
-            twists[bone, 5] += ox * ay - oy * ax
-            count += 1
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def skinning_velocities(matrices, twists, velocities):
-    """Ṡ = [ω]× S + [0 | ν] of every bone, (B, 3, 4)."""
-    for bone in range(matrices.shape[0]):
-        wx, wy, wz = twists[bone, 0], twists[bone, 1], twists[bone, 2]
-        for j in range(4):
-            x, y, z = matrices[bone, 0, j], matrices[bone, 1, j], matrices[bone, 2, j]
-            velocities[bone, 0, j] = wy * z - wz * y
-            velocities[bone, 1, j] = wz * x - wx * z
-            velocities[bone, 2, j] = wx * y - wy * x
-        for i in range(3):
-            velocities[bone, i, 3] += twists[bone, 3 + i]
-
-
-@njit(cache=True, nogil=True, fastmath=True)
-def joint_gradient(skeleton, frames, axes, matrices, gathered, wrenches, gradient):
-    """Turn ∂E/∂S gathered per bone into ∂E/∂p (the tree part of J_Fᵀ u).
-
-    Args:
-        gathered: (B, 3, 4) Σ w (u_x [v; 1]ᵀ + u_n [n; 0]ᵀ).
-        wrenches: (B, 6) scratch: torque about the palm's centre and force of each bone's subtree.
-        gradient: (D,) to which the gradient is **added**.
-    """
-    bones = matrices.shape[0]
-    for bone in range(bones):
-        tx = ty = tz = 0.0
-        for j in range(4):
-            sx, sy, sz = matrices[bone, 0, j], matrices[bone, 1, j], matrices[bone, 2, j]
-            gx, gy, gz = gathered[bone, 0, j], gathered[bone, 1, j], gathered[bone, 2, j]
-            tx += sy * gz - sz * gy
-            ty += sz * gx - sx * gz
-            tz += sx * gy - sy * gx
-        wrenches[bone, 0], wrenches[bone, 1], wrenches[bone, 2] = tx, ty, tz
-        for i in range(3):
-            wrenches[bone, 3 + i] = gathered[bone, i, 3]
-    for bone in range(bones - 1, 0, -1):
-        for c in range(6):
-            wrenches[skeleton.parent[bone], c] += wrenches[bone, c]
+    parents, owners = skeleton.parent, skeleton.revolute_bone
+    gains, dofs = skeleton.revolute_gain, skeleton.revolute_dof
+    bones, screws = chain.bones, chain.screws
+    for b in range(parents.shape[0] - 1, 0, -1):
+        p = np.uint32(parents[b])
+        for i in range(GRADIENT, BONE_COLUMNS):
+            bones[p, i] += bones[b, i]
     for i in range(3):
-        gradient[i] += wrenches[0, 3 + i]
-        gradient[3 + i] += axes[i, 0] * wrenches[0, 0] + axes[i, 1] * wrenches[0, 1] + axes[i, 2] * wrenches[0, 2]
-    for r in range(skeleton.revolute_bone.shape[0]):
-        bone = skeleton.revolute_bone[r]
-        fx, fy, fz = wrenches[bone, 3], wrenches[bone, 4], wrenches[bone, 5]
-        ox, oy, oz = frames[bone, 0, 3], frames[bone, 1, 3], frames[bone, 2, 3]
-        torque_x = wrenches[bone, 0] - (oy * fz - oz * fy)
-        torque_y = wrenches[bone, 1] - (oz * fx - ox * fz)
-        torque_z = wrenches[bone, 2] - (ox * fy - oy * fx)
-        torque = axes[3 + r, 0] * torque_x + axes[3 + r, 1] * torque_y + axes[3 + r, 2] * torque_z
-        gradient[skeleton.revolute_dof[r]] += skeleton.revolute_gain[r] * torque
+        gradient[i] += bones[0, GRADIENT + 3 + i]
+        product[i] += bones[0, PRODUCT + 3 + i]
+        gradient[3 + i] += _work(screws, i, bones, 0, GRADIENT)
+        product[3 + i] += _work(screws, i, bones, 0, PRODUCT)
+    for r in range(owners.shape[0]):
+        b, d, gain = np.uint32(owners[r]), np.uint32(dofs[r]), gains[r]
+        gradient[d] += gain * _work(screws, r + 3, bones, b, GRADIENT)
+        product[d] += gain * _work(screws, r + 3, bones, b, PRODUCT)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def skin(surface, matrices, translation, points, normals):
-    """Pose all vertices and normals (1, 2): (V, 3) each, camera frame."""
-    for i in range(surface.vertices.shape[0]):
-        vx, vy, vz = surface.vertices[i, 0], surface.vertices[i, 1], surface.vertices[i, 2]
-        nx, ny, nz = surface.normals[i, 0], surface.normals[i, 1], surface.normals[i, 2]
-        px, py, pz = translation[0], translation[1], translation[2]
-        qx = qy = qz = 0.0
-        for c in range(surface.influence_count[i]):
-            w = surface.influence_weight[i, c]
-            s = matrices[surface.influence_bone[i, c]]
-            px += w * (s[0, 0] * vx + s[0, 1] * vy + s[0, 2] * vz + s[0, 3])
-            py += w * (s[1, 0] * vx + s[1, 1] * vy + s[1, 2] * vz + s[1, 3])
-            pz += w * (s[2, 0] * vx + s[2, 1] * vy + s[2, 2] * vz + s[2, 3])
-            qx += w * (s[0, 0] * nx + s[0, 1] * ny + s[0, 2] * nz)
-            qy += w * (s[1, 0] * nx + s[1, 1] * ny + s[1, 2] * nz)
-            qz += w * (s[2, 0] * nx + s[2, 1] * ny + s[2, 2] * nz)
-        scale = 1.0 / math.sqrt(qx * qx + qy * qy + qz * qz)
-        points[i, 0], points[i, 1], points[i, 2] = px, py, pz
-        normals[i, 0], normals[i, 1], normals[i, 2] = qx * scale, qy * scale, qz * scale
+@part
+def _work(screws: Array, s: int, bones: Array, b: int, at: int) -> float:
+    """Work rate of a wrench in a screw: their product as 6-vectors."""
+    rotation = screws[s, 0] * bones[b, at] + screws[s, 1] * bones[b, at + 1] + screws[s, 2] * bones[b, at + 2]
+    shift = screws[s, 3] * bones[b, at + 3] + screws[s, 4] * bones[b, at + 4] + screws[s, 5] * bones[b, at + 5]
+    return rotation + shift

@@ -9,12 +9,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from spf.kernels.kinematics import pose_bones, skinning_matrices
+from spf.kernels.compiling import allocating, part
+from spf.kernels.cost_inputs import EMPTY, HAND, UNKNOWN
+from spf.kernels.kinematics import make_chain, pose_bones
+from spf.kernels.skinning import carry
 
 __all__ = [
+    "EMPTY",
     "FAR",
+    "HAND",
+    "UNKNOWN",
     "beyond_wrist",
     "compare_depth",
     "golden_energies",
@@ -26,13 +31,11 @@ __all__ = [
 
 FAR = np.float32(1e9)  # depth of a pixel that nothing covers
 
-#: Labels of the pixels of an observation.
-EMPTY, HAND, UNKNOWN = 0, 1, 2
 FOREARM_RADIUS = 0.044  # m, of an adult's arm
 FOREARM_COST = 0.1
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@part
 def project_vertices(points, camera, projected):
     """Project (V, 3) points to (V, 3) float32 (u, v, z)."""
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
@@ -44,32 +47,21 @@ def project_vertices(points, camera, projected):
         projected[i, 2] = z
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def project_skin(surface, matrices, translation, camera, projected):
-    """Pose and project a skin's vertices in one go, to (V, 3) float32 (u, v, z)."""
+@part
+def project_skin(surface, chain, scale, translation, camera, projected):
+    """Pose, enlarge and project a skin's vertices in one go, to (V, 3) float32 (u, v, z)."""
+    movers, shares, bones = surface.influence_bone, surface.shares, chain.bones
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
-    for i in range(surface.vertices.shape[0]):
-        vx, vy, vz = surface.vertices[i, 0], surface.vertices[i, 1], surface.vertices[i, 2]
-        x, y, z = translation[0], translation[1], translation[2]
-        for c in range(surface.influence_count[i]):
-            w = surface.influence_weight[i, c]
-            bone = surface.influence_bone[i, c]
-            x += w * (
-                matrices[bone, 0, 0] * vx + matrices[bone, 0, 1] * vy + matrices[bone, 0, 2] * vz + matrices[bone, 0, 3]
-            )
-            y += w * (
-                matrices[bone, 1, 0] * vx + matrices[bone, 1, 1] * vy + matrices[bone, 1, 2] * vz + matrices[bone, 1, 3]
-            )
-            z += w * (
-                matrices[bone, 2, 0] * vx + matrices[bone, 2, 1] * vy + matrices[bone, 2, 2] * vz + matrices[bone, 2, 3]
-            )
-        scale = 1.0 / max(z, 1e-3) if perspective else 1.0
-        projected[i, 0] = x * scale * fx + cx
-        projected[i, 1] = y * scale * fy + cy
+    for i in range(movers.shape[0]):
+        x, y, z = carry(movers, shares, bones, i)[:3]
+        x, y, z = scale * x + translation[0], scale * y + translation[1], scale * z + translation[2]
+        inverse = 1.0 / max(z, 1e-3) if perspective else 1.0
+        projected[i, 0] = x * inverse * fx + cx
+        projected[i, 1] = y * inverse * fy + cy
         projected[i, 2] = z
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@part
 def rasterise(projected, faces, depth):
     """Draw the front faces of a closed mesh into a z-buffer (H, W) float32, which is cleared to FAR first.
 
@@ -106,7 +98,7 @@ def rasterise(projected, faces, depth):
                         depth[v, u] = z
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@part
 def visible_vertices(points, normals, projected, depth, tolerance, perspective, visible):
     """List the vertices that the camera sees: front-facing and nearest in the z-buffer.
 
@@ -135,22 +127,22 @@ def visible_vertices(points, normals, projected, depth, tolerance, perspective, 
     return count
 
 
-@njit(cache=True, nogil=True, fastmath=True, inline="always")
+@part
 def beyond_wrist(dx, dy, dz, ax, ay, az):
-    """Whether a point at (dx, dy, dz) from the wrist is forearm: 1 cm past the wrist's plane, in a wide cone around the arm.
+    """Whether a point at (dx, dy, dz) from the wrist is forearm: past the wrist's plane, in a wide cone around the arm.
 
     (ax, ay, az) is the palm's axis towards the arm. The cone leaves room for a bent wrist.
     """
     along = dx * ax + dy * ay + dz * az
-    if along < 0.01:
+    if along < -0.004:
         return False
     across = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
     return across < 0.045 + 1.2 * along
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def _forearm_axis(rendered, observed, labels, camera, wrist, axis, direction):
-    """Direction (3,) from the wrist to the middle of the uncovered hand pixels beyond it; returns their number."""
+@part
+def _forearm_axis(rendered, observed, labels, camera, wrist, axis):
+    """Number of uncovered hand pixels beyond the wrist, and the direction to the middle of them."""
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
     count, sx, sy, sz = 0, 0.0, 0.0, 0.0
     for v in range(rendered.shape[0]):
@@ -164,13 +156,11 @@ def _forearm_axis(rendered, observed, labels, camera, wrist, axis, direction):
                     sx += dx
                     sy += dy
                     sz += dz
-    length = math.sqrt(sx * sx + sy * sy + sz * sz)
-    if length > 0.0:
-        direction[0], direction[1], direction[2] = sx / length, sy / length, sz / length
-    return count
+    length = max(math.sqrt(sx * sx + sy * sy + sz * sz), 1e-12)
+    return count, sx / length, sy / length, sz / length
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@part
 def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scale, truncation):
     """Golden energy: how differently a rendered depth map explains an observed one, 0 (same) to 1.
 
@@ -192,8 +182,7 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
         (golden energy, intersection over union of the silhouettes).
     """
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
-    arm = np.zeros(3)
-    forearm = _forearm_axis(rendered, observed, labels, camera, wrist, axis, arm)
+    forearm, ax, ay, az = _forearm_axis(rendered, observed, labels, camera, wrist, axis)
     inverse = 1.0 / (truncation * truncation)
     tube = (FOREARM_RADIUS * scale) ** 2
     total, union, both = 0.0, 0, 0
@@ -212,7 +201,7 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
                         reach = seen if perspective else 1.0
                         dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], seen - wrist[2]
                         if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2]):
-                            along = dx * arm[0] + dy * arm[1] + dz * arm[2]
+                            along = dx * ax + dy * ay + dz * az
                             if dx * dx + dy * dy + dz * dz - along * along < tube:
                                 total += FOREARM_COST
                                 continue
@@ -224,31 +213,30 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
     return total / max(union, 1), both / max(union, 1)
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@allocating
 def golden_energies(skeleton, proxy, faces, obs, poses, scales, reference, truncation, energies, overlaps):
     """Golden energy and silhouette overlap of many poses (N, D) of the hand enlarged by scales (N,), into (N,) arrays.
 
     The part of the model that falls outside the grid adds its share of the vertices.
     """
-    bones = skeleton.parent.shape[0]
-    frames, matrices = np.empty((bones, 3, 4)), np.empty((bones, 3, 4))
-    axes = np.empty((3 + skeleton.revolute_bone.shape[0], 3))
+    chain = make_chain(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0])
+    wrist, axis = np.empty(3), np.empty(3)
     projected = np.empty((proxy.vertices.shape[0], 3), np.float32)
     height, width = obs.grid_depth.shape
     depth = np.empty((height, width), np.float32)
     for n in range(poses.shape[0]):
-        pose_bones(skeleton, poses[n], reference, frames, axes)
-        skinning_matrices(skeleton, frames, matrices)
-        matrices *= scales[n]
-        project_skin(proxy, matrices, poses[n, :3], obs.grid_camera, projected)
+        pose_bones(skeleton, poses[n], reference, chain)
+        project_skin(proxy, chain, scales[n], poses[n], obs.grid_camera, projected)
         rasterise(projected, faces, depth)
         lost = 0
         for i in range(projected.shape[0]):
             if not (0.0 <= projected[i, 0] < width and 0.0 <= projected[i, 1] < height):
                 lost += 1
+        for i in range(3):
+            wrist[i], axis[i] = scales[n] * chain.bones[0, 4 * i + 3] + poses[n, i], chain.bones[0, 4 * i + 2]
         golden, overlap = compare_depth(
             depth, obs.grid_depth, obs.grid_labels, obs.grid_outside, obs.grid_camera,
-            scales[n] * frames[0, :, 3] + poses[n, :3], frames[0, :, 2], scales[n], truncation,
+            wrist, axis, scales[n], truncation,
         )  # fmt: skip
         energies[n] = golden + lost / projected.shape[0]
         overlaps[n] = overlap

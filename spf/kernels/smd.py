@@ -9,13 +9,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from spf.kernels.compiling import allocating, kernel, strict_kernel
 from spf.kernels.cost import allocate, cost_products
-from spf.kernels.kinematics import pose_bones, skin, skinning_matrices
+from spf.kernels.curvature import gauss_newton_diagonal
+from spf.kernels.kinematics import pose_bones
 from spf.kernels.render import beyond_wrist, project_skin, project_vertices, rasterise, visible_vertices
+from spf.kernels.skinning import skin
 
-__all__ = ["SmdParameters", "gauss_newton_diagonal", "match_pixels", "see", "smd_run", "smd_update"]
+__all__ = ["SmdParameters", "match_pixels", "see", "smd_run", "smd_update"]
 
 
 class SmdParameters(NamedTuple):
@@ -49,7 +51,7 @@ class SmdParameters(NamedTuple):
     zbuffer: bool
 
 
-@njit(cache=True, nogil=True)
+@strict_kernel
 def smd_update(pose, step, trace, gradient, product, meta_step, decay, first, low, high, bound, limits):
     """One SMD update in place, (19), (15), (23), (24), (21).
 
@@ -72,31 +74,45 @@ def smd_update(pose, step, trace, gradient, product, meta_step, decay, first, lo
         pose[d] = constrained
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel
 def see(skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer, work, points, normals, projected, depth, coarse, visible):  # fmt: skip
-    """Pose the skin and list the vertices that the camera sees in this pose; returns their number."""
-    pose_bones(skeleton, pose, reference, work.frames, work.axes)
-    skinning_matrices(skeleton, work.frames, work.matrices)
-    skin(surface, work.matrices, pose[:3], points, normals)
+    """Pose the skin and list the vertices of the hand that the camera sees in this pose; returns their number.
+
+    Vertices past the wrist belong to the arm, which bends as the palm does not: they are never listed.
+    """
+    pose_bones(skeleton, pose, reference, work.chain)
+    skin(surface, work.chain, pose, points, normals)
     project_vertices(points, obs.grid_camera, projected)
     if zbuffer:
-        project_skin(proxy, work.matrices, pose[:3], obs.grid_camera, coarse)
+        project_skin(proxy, work.chain, 1.0, pose, obs.grid_camera, coarse)
         rasterise(coarse, proxy_faces, depth)
     else:
         depth[:] = np.float32(1e9)
-    return visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
+    count = visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
+    bones, kept = work.chain.bones, 0
+    for c in range(count):
+        i = visible[c]
+        past = (
+            (points[i, 0] - pose[0] - bones[0, 3]) * bones[0, 2]
+            + (points[i, 1] - pose[1] - bones[0, 7]) * bones[0, 6]
+            + (points[i, 2] - pose[2] - bones[0, 11]) * bones[0, 10]
+        )
+        if past < 0.0:
+            visible[kept] = i
+            kept += 1
+    return kept
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def match_pixels(points, normals, visible, count, obs, frames, pose, pixels, radius, matches):
+@kernel
+def match_pixels(points, normals, visible, count, obs, bones, pose, pixels, radius, matches):
     """Match observed pixels with the nearest visible vertex; pixels of the forearm get -1.
 
     The forearm is what lies beyond the wrist's plane in a wide cone around the palm's axis.
     """
     squared_radius = radius * radius
     # wrist and palm axis (+z of the palm's frame points to the forearm)
-    wx, wy, wz = frames[0, 0, 3] + pose[0], frames[0, 1, 3] + pose[1], frames[0, 2, 3] + pose[2]
-    ax, ay, az = frames[0, 0, 2], frames[0, 1, 2], frames[0, 2, 2]
+    wx, wy, wz = bones[0, 3] + pose[0], bones[0, 7] + pose[1], bones[0, 11] + pose[2]
+    ax, ay, az = bones[0, 2], bones[0, 6], bones[0, 10]
     for s in range(pixels.shape[0]):
         pixel = pixels[s]
         x, y, z = obs.points[pixel, 0], obs.points[pixel, 1], obs.points[pixel, 2]
@@ -118,30 +134,13 @@ def match_pixels(points, normals, visible, count, obs, frames, pose, pixels, rad
         matches[s] = best
 
 
-@njit(cache=True, nogil=True, fastmath=True)
-def gauss_newton_diagonal(
-    skeleton, surface, spheres, obs, weights, prior, precision, pose, reference, sample, pixels, matches, diagonal, work
-):  # fmt: skip
-    """Diagonal of the Gauss-Newton Hessian of every term, (D,), by products with the unit vectors."""
-    dofs = pose.shape[0]
-    unit, gradient, product = np.zeros(dofs), np.empty(dofs), np.empty(dofs)
-    for d in range(dofs):
-        unit[d] = 1.0
-        cost_products(
-            skeleton, surface, spheres, obs, weights, prior, precision,
-            pose, reference, sample, pixels, matches, unit, gradient, product, work,
-        )  # fmt: skip
-        diagonal[d] = product[d]
-        unit[d] = 0.0
-
-
-@njit(cache=True, nogil=True, fastmath=True)
+@allocating
 def evaluate_poses(
     skeleton, surface, proxy, proxy_faces, spheres, obs, weights, parameters, poses, reference, data_pool, energies
 ):  # fmt: skip
     """E of many poses (N, D) on all their visible vertices and the same observed pixels, without the prior's pull."""
     dofs, vertices = poses.shape[1], surface.vertices.shape[0]
-    work = allocate(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0], spheres.bone.shape[0])
+    work = allocate(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0], spheres.bone.shape[0], dofs)
     points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
     projected = np.empty((vertices, 3), np.float32)
     coarse = np.empty((proxy.vertices.shape[0], 3), np.float32)
@@ -154,7 +153,16 @@ def evaluate_poses(
             work, points, normals, projected, depth, coarse, visible,
         )  # fmt: skip
         match_pixels(
-            points, normals, visible, count, obs, work.frames, poses[n], data_pool, parameters.match_radius, matches
+            points,
+            normals,
+            visible,
+            count,
+            obs,
+            work.chain.bones,
+            poses[n],
+            data_pool,
+            parameters.match_radius,
+            matches,
         )
         energies[n] = cost_products(
             skeleton, surface, spheres, obs, weights, nothing, nothing,
@@ -162,7 +170,7 @@ def evaluate_poses(
         )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@allocating
 def smd_run(
     skeleton, surface, proxy, proxy_faces, spheres, limits, obs, weights, parameters,
     start, reference, prior, precision, bound, floor, draws, data_pool, result, trace_pose, trace_cost, trace_step,
@@ -181,7 +189,7 @@ def smd_run(
     """
     dofs = start.shape[0]
     vertices = surface.vertices.shape[0]
-    work = allocate(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0], spheres.bone.shape[0])
+    work = allocate(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0], spheres.bone.shape[0], dofs)
     points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
     projected = np.empty((vertices, 3), np.float32)
     coarse = np.empty((proxy.vertices.shape[0], 3), np.float32)
@@ -212,7 +220,7 @@ def smd_run(
                 visible,
                 count,
                 obs,
-                work.frames,
+                work.chain.bones,
                 result,
                 data_pool,
                 parameters.match_radius,
@@ -224,7 +232,7 @@ def smd_run(
             for s in range(many):
                 spread[s] = visible[(s * count) // many]
             gauss_newton_diagonal(
-                skeleton, surface, spheres, obs, weights, prior, precision,
+                skeleton, surface, spheres, obs, weights, precision,
                 result, reference, spread, data_pool, pool_matches, curvature, work,
             )  # fmt: skip
             for d in range(dofs):

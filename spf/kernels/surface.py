@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from spf.kernels.compiling import strict_kernel
 
 __all__ = ["depth_in_sphere", "surface_points"]
 
 
-@njit(cache=True, nogil=True)
+@strict_kernel
 def depth_in_sphere(depth, camera, centre, radius, mask):
     """Mark in ``mask`` (H, W) uint8 the pixels whose 3-D point lies in a sphere; camera as five numbers."""
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
@@ -24,7 +24,7 @@ def depth_in_sphere(depth, camera, centre, radius, mask):
                     mask[v, u] = 1
 
 
-@njit(cache=True, nogil=True)
+@strict_kernel
 def surface_points(depth, camera, points, normals):
     """Back-project every pixel and take its unit normal from 3×3 Sobel differences, turned towards the camera.
 

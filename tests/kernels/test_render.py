@@ -8,6 +8,7 @@ import pytest
 from spf.frame import Camera
 from spf.hand import Hand, load_hand
 from spf.hand.kinematics import PosedHand, pose_hand
+from spf.kernels.kinematics import make_chain, pose_bones
 from spf.kernels.render import (
     EMPTY,
     FAR,
@@ -59,14 +60,15 @@ def test_projection_is_the_camera_s(hand: Hand, camera: Camera) -> None:
 
 @CAMERAS
 def test_posing_and_projecting_in_one_go_is_the_same(hand: Hand, camera: Camera) -> None:
-    """Moved rigidly, so that the skinning matrices are plain to write down."""
-    bones = len(hand.skeleton.parent)
-    matrices = np.tile(np.hstack([np.eye(3), np.zeros((3, 1))]), (bones, 1, 1))
-    at = np.array([0.01, -0.02, 0.6])
+    pose = hand.constrain(np.full(hand.dofs, 0.35))
+    pose[:6] = 0.01, -0.02, 0.6, 0.4, 0.3, -0.2
+    chain = make_chain(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone))
+    pose_bones(hand.skeleton, pose, np.eye(3), chain)
     projected = np.empty((len(hand.skin.vertices), 3), np.float32)
-    project_skin(hand.skin, matrices, at, numbers(camera), projected)
-    expected, _ = draw(hand.skin.vertices + at, hand.faces, camera)
-    np.testing.assert_allclose(projected, expected, atol=1e-3)
+    for scale in (1.0, 0.8):
+        project_skin(hand.skin, chain, scale, pose, numbers(camera), projected)
+        expected, _ = draw(pose_hand(hand.scaled(scale), pose).vertices, hand.faces, camera)
+        np.testing.assert_allclose(projected, expected, atol=1e-3)
 
 
 @CAMERAS

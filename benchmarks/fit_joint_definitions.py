@@ -1,0 +1,116 @@
+"""Fit what a data set's joints mean on the model: ``uv run python -m benchmarks.fit_joint_definitions SESSION|RUN …``.
+
+Takes recordings of one data set with truth, tracks each with the default tracker from an automatic start (or reads a
+run of ``spf track`` that is given in its place), and takes for each joint the median, over all frames that the hand was
+held in, of the truth minus the model's joint in its bone's frame, as a fraction of the hand's length. Writes it, with
+the date and how it was done, to ``spf/joint_definitions.json``. To be run once, on CVAR's P1, P4 and P5.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf import __version__
+from spf.errors import SpfError
+from spf.frame import JOINT_NAMES
+from spf.hand.kinematics import pose_hand
+from spf.hand.model import Hand
+from spf.joint_definitions import corrected_joints, definitions, relative_offsets
+from spf.manifest import Plan
+from spf.prepare import prepare
+from spf.runs import MANIFEST, read_run, reopen_session, track_plan
+from spf.sessions import Session, open_session
+from spf.trackers import make_settings
+from spf.trackfile import Track, row_of, track_of
+
+__all__ = ["main"]
+
+Array = NDArray[np.float64]
+_STORED = Path(__file__).resolve().parent.parent / "spf" / "joint_definitions.json"
+
+
+class _Tracked(NamedTuple):
+    session: Session
+    hand: Hand
+    track: Track
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Fit the offsets, print what they leave of the error, and write them."""
+    parser = argparse.ArgumentParser(description="Fit what a data set's joints mean on the model.")
+    parser.add_argument("sources", nargs="+", metavar="SESSION|RUN", help="recordings of one data set, or runs on them")
+    parser.add_argument("--init", choices=("auto", "truth"), default="auto", help="where first poses come from (auto)")
+    parser.add_argument("--seed", type=int, default=0, help="of the tracker")
+    parser.add_argument("-o", "--output", type=Path, default=_STORED, help="file to write (spf/joint_definitions.json)")
+    options = parser.parse_args(arguments)
+    try:
+        tracked = [_tracked(Path(source), options.seed, options.init) for source in options.sources]
+    except SpfError as error:
+        sys.exit(f"fit_joint_definitions: {error}")
+    names = {item.session.joint_definition for item in tracked}
+    if len(names) != 1 or not all(item.session.has_truth for item in tracked):
+        parser.error(f"give recordings with truth of one data set, not of {', '.join(sorted(names))}")
+    offsets = np.nanmedian(np.concatenate([_offsets(item) for item in tracked]), axis=0)
+    for item in tracked:
+        before, after = _errors(item, np.zeros_like(offsets)), _errors(item, offsets)
+        raw, corrected = np.nanmean(before) * 1e3, np.nanmean(after) * 1e3
+        print(f"{item.session.name:<8} {raw:6.2f} mm raw  {corrected:6.2f} mm corrected")
+    entry = {
+        "fitted": datetime.date.today().isoformat(),
+        "recordings": [item.session.name for item in tracked],
+        "frames": [int((~item.track.lost).sum()) for item in tracked],
+        "how": "per joint, median over all held frames of truth minus model in the bone's frame, as a fraction of the "
+        f"hand's length; spf {__version__}, default tracker, start {options.init}, seed {options.seed}",
+        "offsets": {name: np.round(row, 5).tolist() for name, row in zip(JOINT_NAMES, offsets, strict=True)},
+    }
+    content = {**definitions(), names.pop(): entry}
+    options.output.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    print(f"Wrote {options.output}.")
+
+
+def _tracked(source: Path, seed: int, init: str) -> _Tracked:
+    if (source / MANIFEST).exists():
+        run = read_run(source)
+        return _Tracked(reopen_session(run.manifest), run.plan.start.shape.hand(), run.track)
+    session = open_session(source)
+    start = prepare(session, init=init, seed=seed)
+    if start.doubt:
+        print(f"{session.name}: {start.doubt}", file=sys.stderr)
+    plan = Plan("spf", "default", make_settings("spf"), seed, init, 0, len(session), start)
+    hand = start.shape.hand()
+    return _Tracked(session, hand, track_of([row_of(r) for r in track_plan(session, plan)], hand.dof_names))
+
+
+def _offsets(item: _Tracked) -> Array:
+    """(N, 21, 3) offsets in the frames that the hand was held in; NaN where there is no truth."""
+    held = np.flatnonzero(~item.track.lost)
+    result = np.full((len(held), len(JOINT_NAMES), 3), np.nan)
+    for place, row in enumerate(held):
+        truth = item.session.truth(int(item.track.frame[row]))
+        if truth is not None:
+            posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
+            result[place] = relative_offsets(item.hand, posed, truth.joints)
+    return result
+
+
+def _errors(item: _Tracked, offsets: Array) -> Array:
+    """(N, 21) m in all frames, lost ones included."""
+    result = np.full((len(item.track), len(JOINT_NAMES)), np.nan)
+    for row, index in enumerate(item.track.frame):
+        truth = item.session.truth(int(index))
+        if truth is not None:
+            posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
+            result[row] = np.linalg.norm(corrected_joints(item.hand, posed, offsets) - truth.joints, axis=1)
+    return result
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,131 @@
+"""What all commands share: sentences and progress on stderr, results on stdout, options parsed the same way."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from spf import __version__
+from spf.errors import RunError, SettingError
+from spf.sessions import Session, open_session
+
+__all__ = [
+    "INTERRUPTED",
+    "check_output",
+    "complain",
+    "open_given",
+    "parse_assignments",
+    "parse_range",
+    "print_json",
+    "progress_bar",
+    "show_version",
+    "warn",
+]
+
+INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
+
+
+def complain(sentence: str) -> None:
+    """Write one sentence on stderr, on one line."""
+    print("spf: " + " ".join(sentence.split()), file=sys.stderr, flush=True)
+
+
+def warn(sentence: str) -> None:
+    """Write a warning on stderr; nothing for ""."""
+    if sentence:
+        complain(f"warning: {sentence}")
+
+
+def print_json(value: Any) -> None:
+    """Write a value on stdout as JSON."""
+    print(json.dumps(value, indent=2, allow_nan=False))
+
+
+def show_version(wanted: bool) -> None:
+    """Print the version and stop, if it is asked for."""
+    if wanted:
+        print(f"spf {__version__}")
+        raise typer.Exit
+
+
+@contextmanager
+def progress_bar() -> Iterator[Callable[[str, float], None]]:
+    """Show a bar on stderr while it is a terminal; gives ``report(what is done, share)``."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("", total=1.0)
+        yield lambda text, share: progress.update(task, description=text, completed=share)
+
+
+def open_given(uri: str, camera: Path | None = None) -> Session:
+    """Open a session that was named on the command line, and pass on its warnings.
+
+    Raises:
+        SessionError: it cannot be opened.
+    """
+    session = open_session(uri, camera)
+    for sentence in session.warnings:
+        warn(sentence)
+    return session
+
+
+def parse_range(text: str | None, count: int) -> tuple[int, int]:
+    """Read ``A:B`` as the frames [A, B) of a session of ``count`` frames; either may be left out.
+
+    Raises:
+        SettingError: it is no range, is empty or reaches outside the session.
+    """
+    if text is None:
+        return 0, count
+    first_text, colon, last_text = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        first, last = int(first_text or 0), int(last_text or count)
+    except ValueError:
+        raise SettingError(f"--frames takes a range like 0:100, 50: or :100, not '{text}'.") from None
+    if not 0 <= first < last <= count:
+        raise SettingError(
+            f"--frames {text} is outside the session, which has the frames 0 to {count - 1} (write 0:{count} for all)."
+        )
+    return first, last
+
+
+def parse_assignments(texts: list[str]) -> dict[str, str]:
+    """Read ``name=value`` texts.
+
+    Raises:
+        SettingError: one has no name or no value, or a name comes twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise SettingError(f"--set takes name=value, as in --set k=3, not '{text}'.")
+        if name in found:
+            raise SettingError(f"--set {name} is given twice: decide on one value.")
+        found[name] = value
+    return found
+
+
+def check_output(path: Path, force: bool) -> None:
+    """Check that a file may be written, before any work is done.
+
+    Raises:
+        RunError: it exists and may not be replaced, or its folder is missing.
+    """
+    if path.is_dir():
+        raise RunError(f"{path} is a folder: give the name of a file.")
+    if path.exists() and not force:
+        raise RunError(f"{path} exists already: choose another name, or replace it with --force.")
+    if not path.resolve().parent.is_dir():
+        raise RunError(f"There is no folder {path.resolve().parent} to write {path.name} to: make it first.")

@@ -1,0 +1,172 @@
+"""``spf info``, ``spf convert``, ``spf synth``: sessions looked at, converted and made."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from spf.cli.console import (
+    INTERRUPTED,
+    check_output,
+    complain,
+    open_given,
+    parse_assignments,
+    parse_range,
+    print_json,
+    progress_bar,
+)
+from spf.errors import SpfError
+from spf.segmentation import find_regions
+from spf.sessions import MCAPWriter, Session
+from spf.synthetic import CLUTTER, MOTIONS, SENSORS, SHAPES, SyntheticSettings, synthesise
+
+__all__ = ["COMMANDS", "convert", "info", "synth"]
+
+SessionPath = Annotated[str, typer.Argument(metavar="SESSION", help="An MCAP file or a folder of depth images.")]
+CameraFile = Annotated[
+    Path | None, typer.Option("--camera", metavar="FILE", help="Camera file of a PNG folder without a camera.json.")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
+_LOOKED_AT = 7
+
+
+def info(session: SessionPath, camera: CameraFile = None, as_json: AsJson = False) -> None:
+    """Say what a session holds, and whether its depth is believable.
+
+    Example:  spf info sessions/open-close.mcap --json
+    """
+    with open_given(session, camera) as opened:
+        facts = _facts(opened)
+    if as_json:
+        print_json(facts)
+        return
+    width = max(len(name) for name in facts)
+    for name, value in facts.items():
+        text = ", ".join(map(str, value)) if isinstance(value, list) else value
+        text = "–" if text is None or text == "" else text
+        print(f"{name.replace('_', ' '):<{width}}  {text}")
+
+
+def _facts(session: Session) -> dict[str, Any]:
+    camera, times = session.camera, session.times
+    indices = sorted({int(i) for i in np.linspace(0, len(session) - 1, _LOOKED_AT)})
+    frames = [session[index] for index in indices]
+    depths = np.concatenate([frame.depth[frame.depth > 0] for frame in frames])
+    low, middle, high = np.percentile(depths, [1, 50, 99]).round(3).tolist() if depths.size else (None, None, None)
+    seen = sum(bool(find_regions(frame)) for frame in frames)
+    duration = float(times[-1])
+    return {
+        "name": session.name,
+        "format": session.format,
+        "frames": len(session),
+        "duration_s": round(duration, 3),
+        "frames_per_second": round((len(session) - 1) / duration, 2) if duration > 0 else None,
+        "size": [camera.width, camera.height],
+        "camera": camera.model,
+        "focal_length_px": [camera.fx, camera.fy],
+        "principal_point_px": [camera.cx, camera.cy],
+        "depth_unit_m": session.depth_unit,
+        "depth_m": [low, middle, high],
+        "hand_sized_surface": f"in {seen} of the {len(frames)} frames looked at",
+        "side": session.side,
+        "truth": session.joint_definition if session.has_truth else None,
+        "exact_hand_shape": session.hand_shape is not None,
+        "sensor": session.metadata.get("sensor"),
+        "warnings": list(session.warnings),
+    }
+
+
+def convert(
+    session: SessionPath,
+    output: Annotated[Path, typer.Argument(metavar="OUT.mcap", help="The file to write.")],
+    camera: CameraFile = None,
+    frames: Annotated[str | None, typer.Option(metavar="A:B", help="Only frames A to B−1.")] = None,
+    force: Force = False,
+) -> None:
+    """Convert any session to the native format, truth and colour included.
+
+    Example:  spf convert recordings/P5 P5.mcap --frames 0:200
+    """
+    check_output(output, force)
+    with open_given(session, camera) as opened:
+        first, last = parse_range(frames, len(opened))
+        _write(opened, output, first, last)
+    print(f"Wrote {last - first} frames to {output}.")
+
+
+def _write(session: Session, output: Path, first: int, last: int) -> None:
+    """Write frames under another name until all are written; Ctrl-C ends it with those written until then.
+
+    Raises:
+        SessionError: a frame cannot be read or written; then nothing is kept.
+        typer.Exit: Ctrl-C was pressed.
+    """
+    part, done = output.with_name(f".{output.name}.part"), 0
+    writer = MCAPWriter(
+        part,
+        camera=session.camera,
+        depth_unit=session.depth_unit,
+        side=session.side,
+        joint_definition=session.joint_definition,
+        hand_shape=session.hand_shape,
+        start_time_ns=session.start_time_ns,
+        metadata=session.metadata,
+        overwrite=True,
+    )
+    try:
+        with writer, progress_bar() as report:
+            for done, index in enumerate(range(first, last), 1):
+                writer.write(session[index])
+                report(f"Writing {output.name}", done / (last - first))
+    except KeyboardInterrupt:
+        os.replace(part, output)
+        complain(f"stopped: about {done} frames were written until now and are kept in {output}.")
+        raise typer.Exit(INTERRUPTED) from None
+    except SpfError:
+        part.unlink(missing_ok=True)
+        raise
+    os.replace(part, output)
+
+
+def _names(table: Any) -> str:
+    return ", ".join(table)
+
+
+def synth(
+    output: Annotated[Path, typer.Argument(metavar="OUT.mcap", help="The file to write.")],
+    motion: Annotated[str, typer.Option(help=f"What the hand does: {_names(MOTIONS)}.")] = "open_close",
+    sensor: Annotated[str, typer.Option(help=f"What sees it: {_names(SENSORS)}.")] = "senz3d",
+    clutter: Annotated[str, typer.Option(help=f"What else is there: {_names(CLUTTER)}.")] = "forearm",
+    frames: Annotated[int, typer.Option(help="Number of frames.")] = 120,
+    speed: Annotated[float, typer.Option(help="Mean motion of the joints a frame, mm (4 slow, 9, 16 fast).")] = 9.0,
+    side: Annotated[str, typer.Option(help="Which hand: right, left.")] = "right",
+    shape: Annotated[str, typer.Option(help=f"Shape of the hand: {_names(SHAPES)}, random.")] = "standard",
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help=f"Any setting of {_names(info.name for info in SyntheticSettings.describe())}; repeatable.",
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Make a synthetic session with exact truth.
+
+    Example:  spf synth wave.mcap --motion wave --sensor kinect2 --frames 200 --seed 1 --set holes=0.05
+    """
+    check_output(output, force)
+    named = {"motion": motion, "sensor": sensor, "clutter": clutter, "side": side, "shape": shape}
+    settings = SyntheticSettings().replace(frames=frames, speed_mm=speed, seed=seed, **named)
+    session = synthesise(settings.with_text(parse_assignments(assignments or [])))
+    _write(session, output, 0, len(session))
+    print(f"Wrote {len(session)} frames of a {session.side} hand to {output}.\nNext: spf track {output} -o RUN")
+
+
+COMMANDS = (info, convert, synth)

@@ -1,0 +1,196 @@
+"""``spf calibrate`` and ``spf track``: a hand measured, a session tracked, a run repeated."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from spf.cli.console import (
+    INTERRUPTED,
+    check_output,
+    complain,
+    open_given,
+    parse_assignments,
+    parse_range,
+    print_json,
+    progress_bar,
+    warn,
+)
+from spf.cli.sessions import AsJson, CameraFile, Force, SessionPath
+from spf.errors import RunError, SettingError
+from spf.evaluate import count_losses
+from spf.hand import SavedPose, read_hand_shape, write_hand_shape, write_pose
+from spf.initialise import Start
+from spf.manifest import Plan, manifest_of
+from spf.prepare import prepare
+from spf.runs import RunWriter, check_free, read_run, reopen_session, track_plan
+from spf.sessions import Session
+from spf.trackers import PRESETS, TRACKERS, make_settings
+from spf.trackfile import Track
+
+__all__ = ["COMMANDS", "calibrate", "track"]
+
+FrameRange = Annotated[str | None, typer.Option("--frames", metavar="A:B", help="Only frames A to B−1.")]
+Init = Annotated[str, typer.Option(metavar="auto|truth|POSE.json", help="Where the first pose comes from.")]
+
+
+def calibrate(
+    session: SessionPath,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="HAND.json", help="The hand file to write.")],
+    pose: Annotated[Path | None, typer.Option(metavar="POSE.json", help="Write the first pose too.")] = None,
+    init: Init = "auto",
+    frames: FrameRange = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
+    camera: CameraFile = None,
+    force: Force = False,
+) -> None:
+    """Measure a hand's side, size and shape from the depth of its session.
+
+    Example:  spf calibrate recordings/P5 -o p5-hand.json
+    """
+    for path in (output, pose):
+        if path is not None:
+            check_output(path, force)
+    with open_given(session, camera) as opened, progress_bar() as report:
+        first, last = parse_range(frames, len(opened))
+        start = prepare(opened, init=init, seed=seed, first=first, last=last, progress=report)
+    write_hand_shape(start.shape, output)
+    if pose is not None:
+        write_pose(SavedPose(start.shape.side, start.pose, start.reference, start.frame, start.shape), pose)
+    print(_description(start))
+    warn(start.doubt)
+    print(f"Wrote {output}.\nNext: spf track {session} --hand {output} -o RUN")
+
+
+def _description(start: Start) -> str:
+    length = start.shape.hand().length * 1e3
+    return (
+        f"A {start.shape.side} hand of {length:.0f} mm from wrist to middle fingertip (scale {start.shape.scale:.3f}), "
+        f"first believed in frame {start.frame}; unexplained depth {start.golden:.2f}."
+    )
+
+
+def track(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Directory of the run.")],
+    session: Annotated[
+        str | None, typer.Argument(metavar="SESSION", help="An MCAP file or a folder of depth images.")
+    ] = None,
+    tracker: Annotated[str | None, typer.Option(help=f"One of {', '.join(TRACKERS)}; spf if not given.")] = None,
+    preset: Annotated[str | None, typer.Option(help=f"One of {', '.join(PRESETS)}; default if not given.")] = None,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, as --set k=3 --set n=4; repeatable."),
+    ] = None,
+    hand: Annotated[
+        Path | None, typer.Option(metavar="HAND.json", help="Shape of the hand; found if not given.")
+    ] = None,
+    init: Annotated[
+        str | None,
+        typer.Option(metavar="auto|truth|POSE.json", help="Where the first pose comes from; auto if not given."),
+    ] = None,
+    frames: FrameRange = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random; 0 if not given.")] = None,
+    camera: CameraFile = None,
+    repeat: Annotated[Path | None, typer.Option(metavar="DIR", help="Repeat this run, bit for bit.")] = None,
+    force: Force = False,
+    as_json: AsJson = False,
+) -> None:
+    """Track the hand of a session; the track and all that is needed to repeat it go to a directory.
+
+    Examples:
+
+        spf track sessions/open-close.mcap -o runs/a
+
+        spf track recordings/P5 -o runs/b --preset paper --set n=16 --frames 0:300 --seed 3
+
+        spf track --repeat runs/b -o runs/c
+    """
+    check_free(output, force)
+    if repeat is not None:
+        options: dict[str, Any] = {"--tracker": tracker, "--preset": preset, "--set": assignments, "--hand": hand}
+        options |= {"--init": init, "--frames": frames, "--seed": seed, "--camera": camera}
+        _refuse_with_repeat([name for name, value in options.items() if value is not None])
+        opened, plan, camera = _plan_to_repeat(repeat, session)
+    elif session is None:
+        raise SettingError("There is nothing to track: name a session, as in spf track SESSION -o DIR.")
+    else:
+        settings = make_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
+        shape = None if hand is None else read_hand_shape(hand)
+        opened = open_given(session, camera)
+        first, last = parse_range(frames, len(opened))
+        with progress_bar() as report:
+            start = prepare(
+                opened, init=init or "auto", shape=shape, seed=seed or 0, first=first, last=last, progress=report
+            )
+        plan = Plan(tracker or "spf", preset or "default", settings, seed or 0, init or "auto", first, last, start)
+    with opened:
+        warn(plan.start.doubt)
+        track_found = _track_to(output, opened, plan, camera, force)
+    _summarise(output, track_found, plan, as_json)
+
+
+def _refuse_with_repeat(given: list[str]) -> None:
+    if given:
+        raise SettingError(f"--repeat takes everything from the run that it repeats: leave out {', '.join(given)}.")
+
+
+def _plan_to_repeat(directory: Path, session: str | None) -> tuple[Session, Plan, Path | None]:
+    run = read_run(directory)
+    opened = reopen_session(run.manifest, session)
+    stored = run.manifest["session"]["camera_file"]
+    now = manifest_of(run.plan, opened, None, [])
+    changed = [name for name in ("spf_version", "packages", "platform") if now[name] != run.manifest[name]]
+    if changed:
+        warn(f"the run was made with another {' and '.join(changed)}, so that the track may differ in its last digits.")
+    return opened, run.plan, None if stored is None else Path(stored)
+
+
+def _track_to(output: Path, session: Session, plan: Plan, camera: Path | None, force: bool) -> Track:
+    """Track a plan into a directory; Ctrl-C ends it with what was tracked until then.
+
+    Raises:
+        typer.Exit: Ctrl-C was pressed.
+    """
+    manifest = manifest_of(plan, session, camera, ["spf", *sys.argv[1:]])
+    writer = RunWriter(output, manifest, plan.start.shape.hand().dof_names, overwrite=force)
+    count = plan.last - plan.first
+    try:
+        with writer, progress_bar() as report:
+            for done, result in enumerate(track_plan(session, plan), 1):
+                writer.add(result)
+                report("Lost, searching" if result.lost else "Tracking", done / count)
+    except KeyboardInterrupt:
+        complain(f"stopped: the {len(writer.track)} frames tracked until now are kept in {output}.")
+        raise typer.Exit(INTERRUPTED) from None
+    if not len(writer.track):
+        raise RunError("No frame was tracked.")
+    return writer.track
+
+
+def _summarise(output: Path, track: Track, plan: Plan, as_json: bool) -> None:
+    losses = count_losses(track.lost)
+    seconds = track.seconds[track.seconds > 0]
+    summary: dict[str, Any] = {
+        "run": str(output),
+        "frames": len(track),
+        "losses": losses.losses,
+        "frames_lost": losses.frames_lost,
+        "seconds_per_frame_median": float(np.median(seconds)),
+        "doubt": plan.start.doubt,
+    }
+    if as_json:
+        print_json(summary)
+        return
+    print(_description(plan.start))
+    print(
+        f"Tracked {len(track)} frames with {plan.tracker}: {losses.losses} losses, {losses.frames_lost} frames without "
+        f"a hand, {summary['seconds_per_frame_median'] * 1e3:.0f} ms a frame (median)."
+    )
+    print(f"Next: spf evaluate {output}")
+
+
+COMMANDS = (calibrate, track)

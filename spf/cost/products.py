@@ -1,0 +1,125 @@
+"""E(p), its gradient and its Gauss-Newton product at one pose: what an optimiser asks of a cost (3, 14, 22)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from spf.cost.problem import Problem
+from spf.errors import HandError
+from spf.hand.model import Hand
+from spf.kernels.cost import Spheres, Workspace, allocate, cost_products
+from spf.kernels.curvature import gauss_newton_diagonal
+from spf.kernels.smd import match_pixels
+from spf.kernels.smd import see as see_kernel
+
+__all__ = ["Products", "Sample", "curvature", "products", "see"]
+
+Array = NDArray[np.float64]
+
+
+class Sample(NamedTuple):
+    """What a cost is evaluated on.
+
+    Attributes:
+        points: (m,) int32 vertices of the skin.
+        pixels: (n,) int32 observed pixels, flat indices into the crop.
+        matches: (n,) int32 the vertex that each pixel is compared with; -1 for none.
+    """
+
+    points: NDArray[np.int32]
+    pixels: NDArray[np.int32]
+    matches: NDArray[np.int32]
+
+
+class Products(NamedTuple):
+    """A cost at a pose.
+
+    Attributes:
+        energy: E.
+        gradient: (D,) g.
+        product: (D,) H v.
+    """
+
+    energy: float
+    gradient: Array
+    product: Array
+
+
+def see(problem: Problem, pose: ArrayLike) -> Sample:
+    """Return all vertices that the camera sees in a pose (D,), and the frame's pool of pixels with their matches."""
+    hand, obs, p = problem.hand, problem.observation.arrays, _checked(problem, pose)
+    vertices = len(hand.skin.vertices)
+    work = _workspace(hand, problem.spheres)
+    points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
+    projected = np.empty((vertices, 3), np.float32)
+    coarse = np.empty((len(hand.proxy.vertices), 3), np.float32)
+    depth = np.empty(obs.grid_depth.shape, np.float32)
+    visible, matches = np.empty(vertices, np.int32), np.empty(len(problem.data_pool), np.int32)
+    count = see_kernel(
+        hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, obs, p, problem.reference,
+        bool(problem.settings.zbuffer), work, points, normals, projected, depth, coarse, visible,
+    )  # fmt: skip
+    match_pixels(
+        points, normals, visible, count, obs, work.chain.bones, p, problem.data_pool, problem.match_radius, matches
+    )
+    return Sample(visible[:count].copy(), problem.data_pool, matches)
+
+
+def products(
+    problem: Problem,
+    pose: ArrayLike,
+    direction: ArrayLike,
+    sample: Sample,
+    *,
+    prior: ArrayLike | None = None,
+    precision: ArrayLike | None = None,
+) -> Products:
+    """Evaluate E, its gradient (14) and its Gauss-Newton product with a direction (22), in one pass.
+
+    Args:
+        problem: cost and observation.
+        pose: (D,) p, relative to ``problem.reference``.
+        direction: (D,) v.
+        sample: what is compared; correspondences and tangent planes are taken at ``pose`` and held fixed (7-11).
+        prior, precision: (D,) pull ½ π (p − p̄)²; none when None.
+
+    Raises:
+        HandError: a pose has the wrong length or is not finite.
+    """
+    hand, p, v = problem.hand, _checked(problem, pose), _checked(problem, direction)
+    work = _workspace(hand, problem.spheres)
+    gradient, product = np.empty(hand.dofs), np.empty(hand.dofs)
+    energy = cost_products(
+        hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,
+        p if prior is None else _checked(problem, prior),
+        np.zeros(hand.dofs) if precision is None else _checked(problem, precision),
+        p, problem.reference, *sample, v, gradient, product, work,
+    )  # fmt: skip
+    return Products(float(energy), gradient, product)
+
+
+def curvature(problem: Problem, pose: ArrayLike, sample: Sample, *, precision: ArrayLike | None = None) -> Array:
+    """Return the diagonal (D,) of the Gauss-Newton Hessian whose products :func:`products` gives."""
+    hand, p = problem.hand, _checked(problem, pose)
+    diagonal = np.empty(hand.dofs)
+    gauss_newton_diagonal(
+        hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,
+        np.zeros(hand.dofs) if precision is None else _checked(problem, precision),
+        p, problem.reference, *sample, diagonal, _workspace(hand, problem.spheres),
+    )  # fmt: skip
+    return diagonal
+
+
+def _workspace(hand: Hand, spheres: Spheres) -> Workspace:
+    """Return scratch for one thread."""
+    return allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(spheres.bone), hand.dofs)
+
+
+def _checked(problem: Problem, pose: ArrayLike) -> Array:
+    p = np.ascontiguousarray(pose, dtype=np.float64)
+    if p.shape != (problem.hand.dofs,) or not np.isfinite(p).all():
+        raise HandError(f"A pose of this hand has {problem.hand.dofs} finite entries; this one has shape {p.shape}.")
+    return p
