@@ -27,7 +27,7 @@ class Picture(JSComponent):
       const hint = document.createElement('div');
       hint.className = 'picture-hint';
       frame.append(img, hint);
-      let url = null;
+      let url = null, answered = () => {};
       const show = () => {
         const bytes = model.image;
         const some = bytes && bytes.byteLength > 0;
@@ -57,9 +57,9 @@ class Picture(JSComponent):
         if (waiting || (right === 0 && up === 0 && magnify === 1)) return;
         model.send_msg({ kind: 'orbit', right, up, magnify });
         right = 0; up = 0; magnify = 1; waiting = true;
-        timer = setTimeout(answered, 300);
+        timer = setTimeout(() => answered(), 300);
       };
-      const answered = () => { clearTimeout(timer); waiting = false; send(); };
+      answered = () => { clearTimeout(timer); waiting = false; send(); };
       frame.classList.add('turns');
       frame.addEventListener('pointerdown', (e) => { frame.setPointerCapture(e.pointerId); e.preventDefault(); });
       frame.addEventListener('pointermove', (e) => {

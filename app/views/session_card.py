@@ -11,6 +11,7 @@ import panel_material_ui as pmu
 
 from app.state import State
 from app.uploads import LARGEST_UPLOAD, Uploads
+from app.views.fold import folded
 from spf.errors import SessionError
 from spf.sessions import Session
 
@@ -47,10 +48,8 @@ class SessionCard:
         self._choice.param.watch(self._open_choice, "value")
         self._file.param.watch(self._open_upload, "value")
         state.param.watch(self._describe, "session")
-        other = pmu.Card(
-            self._path, self._camera, pmu.Row(go, self._file), title="Open another", collapsed=True,
-            title_variant="body2", variant="outlined", sizing_mode="stretch_width", margin=(5, 10),
-        )  # fmt: skip
+        controls = [self._path, self._camera, pmu.Row(go, self._file)]
+        other = folded("Open another session", lambda: controls)
         self.panel = pmu.Column(self._choice, self._facts, other, sizing_mode="stretch_width")
 
     async def _open_choice(self, event: Any) -> None:

@@ -9,6 +9,7 @@ import panel as pn
 import panel_material_ui as pmu
 
 from app.state import State
+from app.views.fold import folded
 from spf.settings import SettingInfo
 from spf.trackers import PRESETS, TRACKERS
 
@@ -39,11 +40,6 @@ class SettingsCard:
         self._widgets: dict[str, Any] = {}
         for name in SLIDERS:
             self._add(name, _slider(self._infos[name]))
-        self._others = pmu.Card(
-            title="All other settings", collapsed=True, title_variant="body2", variant="outlined",
-            sizing_mode="stretch_width", margin=(5, 10),
-        )  # fmt: skip
-        self._others.param.watch(self._fill, "collapsed")
         self._hint = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
         self._back = pmu.Button(
             label="Back to the preset", icon="undo", variant="text", size="small", visible=False,
@@ -53,7 +49,7 @@ class SettingsCard:
         self._follow()
         self.panel = pmu.Column(
             pmu.Row(tracker, preset, sizing_mode="stretch_width"), *(self._widgets[name] for name in SLIDERS),
-            self._hint, self._back, self._others, sizing_mode="stretch_width",
+            self._hint, self._back, folded("All other settings", self._others), sizing_mode="stretch_width",
         )  # fmt: skip
 
     def _add(self, name: str, widget: Any) -> Any:
@@ -61,20 +57,18 @@ class SettingsCard:
         widget.param.watch(partial(self._changed, name), "value")
         return widget
 
-    def _fill(self, _event: Any) -> None:
-        """Make the other settings when they are asked for: a page without them is there sooner."""
-        if self._others.objects:
-            return
+    def _others(self) -> list[Any]:
+        """Return the fields of all other settings, under the headings of their groups."""
         groups: dict[str, list[Any]] = {}
         for name, info in self._infos.items():
             if name not in SLIDERS:
                 groups.setdefault(info.group, []).append(self._add(name, _field(info)))
-        self._others.objects = [
+        self._follow()
+        return [
             part
             for group, widgets in groups.items()
             for part in (pmu.Typography(group, variant="subtitle2", margin=(8, 10, 0, 10)), *widgets)
         ]
-        self._follow()
 
     def _changed(self, name: str, event: Any) -> None:
         value = event.new

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import panel as pn
@@ -24,11 +25,11 @@ class Transport:
         self._play = pmu.Button(label="Play", icon="play_arrow", on_click=self._on_play, width=104, size="small",
                                 margin=(8, 4))  # fmt: skip
         self._slider = pmu.IntSlider(
-            label="Frame", show_value=False, start=0, end=1, value=0, disabled=True, sizing_mode="stretch_width",
-            margin=(8, 18), size="small",
+            label="", show_value=False, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
+            sizing_mode="stretch_width", margin=(8, 18), size="small",
         )  # fmt: skip
         self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
-        self._slider.param.watch(self._on_slide, "value_throttled")
+        self._slider.param.watch(self._on_slide, "value")
         state.param.watch(self._follow, ["session", "frame", "revision", "task", "playing", "origin"])
         self._follow()
         self.panel = pmu.Row(
@@ -47,8 +48,9 @@ class Transport:
         else:
             await self._controller.play()
 
-    async def _on_slide(self, event: Any) -> None:
-        await self._controller.jump(event.new)
+    def _on_slide(self, event: Any) -> None:
+        if event.new != self._state.frame:  # else the slider only follows
+            pn.state.execute(partial(self._controller.jump, event.new))
 
     def _follow(self, *_events: Any) -> None:
         state = self._state
