@@ -94,7 +94,7 @@ class TrackedFrame(NamedTuple):
         observation: what was seen; None while lost.
     """
 
-    index: int
+    index: int  # type: ignore[assignment]  # a frame has an index; a tuple's method of that name is not missed
     time: float
     pose: Array
     reference: Array

@@ -119,7 +119,7 @@ def visible_vertices(points, normals, projected, depth, tolerance, perspective, 
             facing = normals[i, 2]
         if facing > -0.05:
             continue
-        u, v = int(round(projected[i, 0])), int(round(projected[i, 1]))
+        u, v = round(projected[i, 0]), round(projected[i, 1])
         if 0 <= u < width and 0 <= v < height and projected[i, 2] > depth[v, u] + tolerance:
             continue
         visible[count] = i
