@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 _PRIOR_SPREAD = np.array([0.5, *([0.08] * 5), 0.06, 0.06, 0.06])
 _NAMES = len(_PRIOR_SPREAD)
 _POOL = 250
+_BACKGROUND = 0.2
 _DELTA = 1e-3
 
 
@@ -73,7 +74,7 @@ def fit_shape(
     Returns:
         (shape, views with their poses in that shape, mean golden energy).
     """
-    settings, descent = CostSettings(), SmdSettings(rounds=4)
+    settings, descent = CostSettings(background=_BACKGROUND), SmdSettings(rounds=4)
     parameters = _parameters(first)
     free = np.ones(_NAMES, bool) if refine else np.arange(_NAMES) == 0
     for _ in range(iterations):

@@ -29,6 +29,7 @@ __all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "run", "track_fram
 Array = NDArray[np.float64]
 _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
+_DOUBT, _AGAIN = 5, 15  # poor frames in a row after which a better pose is searched for, and until it is again
 _FIRST_EFFORT = 3.0
 _FRAME = 1.0 / 30.0  # s
 _NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a lost hand is believed in, and how much it grows a frame
@@ -65,6 +66,7 @@ class TrackState(NamedTuple):
         fresh: whether the pose was just found and no frame has refined it.
         golden: golden energy of the last estimate; 1 when there is none.
         missing: frames since the hand was lost.
+        poor: frames in a row that are explained worse than a hand that is found would be.
     """
 
     filter: smart.State
@@ -74,6 +76,7 @@ class TrackState(NamedTuple):
     fresh: bool
     golden: float
     missing: int
+    poor: int
 
 
 class TrackedFrame(NamedTuple):
@@ -124,7 +127,7 @@ def begin(
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
     state = smart.start(tracking.hand, pose, reference, time_, count)
-    return TrackState(state, False, (), 0, True, 1.0, 0)
+    return TrackState(state, False, (), 0, True, 1.0, 0, 0)
 
 
 def track_frame(
@@ -144,7 +147,7 @@ def track_frame(
     began = time.perf_counter()
     rng = np.random.default_rng([tracking.seed, frame.index])
     was_lost = state.lost
-    if was_lost:
+    if was_lost or (state.poor >= _DOUBT and (state.poor - _DOUBT) % _AGAIN == 0):
         state = _sought(tracking, state, frame, rng)
     searched = time.perf_counter()
     observation = observe(frame, state.filter.estimate[:3], reach_of(tracking.hand))
@@ -175,7 +178,8 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     found = recover(frame, tracking.hand, limit, state.filter.estimate[:3], within, rng)
     if found is None:
         return state
-    return _restart(tracking, found, np.eye(3), frame.time - _FRAME)._replace(history=state.history, lost=True)
+    fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
+    return fresh._replace(history=state.history, lost=state.lost)
 
 
 def _usual(state: TrackState, tracking: Tracking) -> float:
@@ -192,10 +196,12 @@ def _judged(tracking: Tracking, state: TrackState, filter_state: smart.State, in
     """Notice a loss, frames in a row that the estimate's render explains much worse than usual, and its end."""
     golden = info.estimate_golden
     bad = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
+    poor = golden > _believable(state, tracking)
     count = state.bad + 1 if bad else 0
-    history = state.history if bad or state.lost else (*state.history, golden)[-_HISTORY:]
-    lost = golden > _believable(state, tracking) if state.lost else count >= _PATIENCE
-    return TrackState(filter_state, lost, history, count, False, golden, state.missing + 1 if lost else 0)
+    history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
+    lost = poor if state.lost else count >= _PATIENCE
+    missing = state.missing + 1 if lost else 0
+    return TrackState(filter_state, lost, history, count, False, golden, missing, state.poor + 1 if poor else 0)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:

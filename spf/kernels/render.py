@@ -128,13 +128,14 @@ def visible_vertices(points, normals, projected, depth, tolerance, perspective, 
 
 
 @part
-def beyond_wrist(dx, dy, dz, ax, ay, az):
+def beyond_wrist(dx, dy, dz, ax, ay, az, least):
     """Whether a point at (dx, dy, dz) from the wrist is forearm: past the wrist's plane, in a wide cone around the arm.
 
-    (ax, ay, az) is the palm's axis towards the arm. The cone leaves room for a bent wrist.
+    (ax, ay, az) is the palm's axis towards the arm, ``least`` how far past the plane the forearm begins, m. The cone leaves
+    room for a bent wrist.
     """
     along = dx * ax + dy * ay + dz * az
-    if along < -0.004:
+    if along < least:
         return False
     across = math.sqrt(max(dx * dx + dy * dy + dz * dz - along * along, 0.0))
     return across < 0.045 + 1.2 * along
@@ -151,7 +152,7 @@ def _forearm_axis(rendered, observed, labels, camera, wrist, axis):
                 z = observed[v, u]
                 reach = z if perspective else 1.0
                 dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], z - wrist[2]
-                if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2]):
+                if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2], -0.004):
                     count += 1
                     sx += dx
                     sy += dy
@@ -199,7 +200,7 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
                     if forearm > 0:
                         reach = seen if perspective else 1.0
                         dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], seen - wrist[2]
-                        if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2]):
+                        if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2], -0.004):
                             along = dx * ax + dy * ay + dz * az
                             radius = FOREARM_RADIUS * scale + FOREARM_TAPER * max(along, 0.0)
                             if dx * dx + dy * dy + dz * dz - along * along < radius * radius:

@@ -79,10 +79,7 @@ def see(
     skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer,
     work, points, normals, projected, depth, coarse, visible,
 ):  # fmt: skip
-    """Pose the skin and list the vertices of the hand that the camera sees in this pose; returns their number.
-
-    Vertices past the wrist belong to the arm, which bends as the palm does not: they are never listed.
-    """
+    """Pose the skin and list the vertices that the camera sees in this pose; returns their number."""
     pose_bones(skeleton, pose, reference, work.chain)
     skin(surface, work.chain, pose, points, normals)
     project_vertices(points, obs.grid_camera, projected)
@@ -91,19 +88,7 @@ def see(
         rasterise(coarse, proxy_faces, depth)
     else:
         depth[:] = np.float32(1e9)
-    count = visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
-    bones, kept = work.chain.bones, 0
-    for c in range(count):
-        i = visible[c]
-        past = (
-            (points[i, 0] - pose[0] - bones[0, 3]) * bones[0, 2]
-            + (points[i, 1] - pose[1] - bones[0, 7]) * bones[0, 6]
-            + (points[i, 2] - pose[2] - bones[0, 11]) * bones[0, 10]
-        )
-        if past < 0.0:
-            visible[kept] = i
-            kept += 1
-    return kept
+    return visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
 
 
 @kernel
@@ -119,7 +104,7 @@ def match_pixels(points, normals, visible, count, obs, bones, pose, pixels, radi
     for s in range(pixels.shape[0]):
         pixel = pixels[s]
         x, y, z = obs.points[pixel, 0], obs.points[pixel, 1], obs.points[pixel, 2]
-        if beyond_wrist(x - wx, y - wy, z - wz, ax, ay, az):
+        if beyond_wrist(x - wx, y - wy, z - wz, ax, ay, az, 0.01):
             matches[s] = -1
             continue
         nx, ny, nz = obs.normals[pixel, 0], obs.normals[pixel, 1], obs.normals[pixel, 2]
