@@ -13,8 +13,8 @@ from app.state import State
 
 __all__ = ["Transport"]
 
-# What the slider's throttled value is put back to after each jump: a jump to the same frame is an event again. The value
-# itself won't do, for the browser echoes what the server sets, late, and that would be taken for a jump back.
+# What the slider's throttled value is put back to after each jump, so that a jump to the same frame is an event again.
+# The value itself won't do: the browser echoes what the server sets, late, and that would be taken for a jump back.
 _NOWHERE = -1
 
 
@@ -29,7 +29,7 @@ class Transport:
         self._play = pmu.Button(label="Play", icon="play_arrow", on_click=self._on_play, width=104, size="small",
                                 margin=(8, 4))  # fmt: skip
         self._slider = pmu.IntSlider(
-            label="", show_value=False, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
+            label="", show_value=False, value_throttled=_NOWHERE, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
             sizing_mode="stretch_width", margin=(8, 18), size="small",
         )  # fmt: skip
         self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
