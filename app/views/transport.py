@@ -29,10 +29,11 @@ class Transport:
         self._play = pmu.Button(label="Play", icon="play_arrow", on_click=self._on_play, width=104, size="small",
                                 margin=(8, 4))  # fmt: skip
         self._slider = pmu.IntSlider(
-            label="", show_value=False, value_throttled=_NOWHERE, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
+            label="", show_value=False, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
             sizing_mode="stretch_width", margin=(8, 18), size="small",
         )  # fmt: skip
         self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
+        self._rearm()
         self._slider.param.watch(self._on_slide, "value_throttled")
         state.param.watch(self._follow, ["session", "frame", "revision", "task", "playing", "origin"])
         self._follow()
@@ -55,9 +56,12 @@ class Transport:
     async def _on_slide(self, event: Any) -> None:
         if event.new == _NOWHERE:
             return
+        self._rearm()
+        await self._controller.jump(event.new)
+
+    def _rearm(self) -> None:
         with param.edit_constant(self._slider):
             self._slider.value_throttled = _NOWHERE
-        await self._controller.jump(event.new)
 
     def _follow(self, *_events: Any) -> None:
         state = self._state
