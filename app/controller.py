@@ -80,7 +80,7 @@ class Controller:
         def work(report: Report) -> Origin:
             shape = read_hand_shape(hand_file) if hand_file else None
             start = prepare(session, init=init, shape=shape, seed=seed, progress=report)
-            return Origin(start, *begin(tracker, settings, start, seed))
+            return Origin(start, *begin(tracker, settings, start, seed, time=float(session.times[start.frame])))
 
         return work
 
@@ -167,7 +167,9 @@ class Controller:
         assert origin is not None
         tracking = origin.tracking._replace(tracker=state.tracker, settings=state.settings)
         if index == origin.start.frame:
-            return begin(state.tracker, state.settings, origin.start, origin.tracking.seed)
+            assert state.session is not None
+            time = float(state.session.times[index])
+            return begin(state.tracker, state.settings, origin.start, origin.tracking.seed, time=time)
         entry = state.results.entry(index - 1)
         if entry is None:
             raise StartError(

@@ -8,7 +8,8 @@ No ground truth is involved.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def fit_shape(
             for view, seed in zip(views, seeds, strict=True)
         ]
         normals = map_threads(
-            lambda item: _normal_equations(item[0], item[1].pose, hands),
+            partial(_equations_of, hands),
             list(zip(problems, views, strict=True)),
         )
         step = _shape_step(normals, parameters, free)
@@ -117,6 +118,11 @@ def _shape(first: HandShape, parameters: Array) -> HandShape:
     )
 
 
+def _equations_of(hands: list[Hand], item: tuple[Problem, View]) -> _Normal:
+    problem, view = item
+    return _normal_equations(problem, view.pose, hands)
+
+
 def _normal_equations(problem: Problem, pose: Array, hands: list[Hand]) -> _Normal:
     """Residuals of one view with their derivatives by pose and by shape, as normal equations."""
     found = correspondences(problem, pose)
@@ -128,7 +134,7 @@ def _normal_equations(problem: Problem, pose: Array, hands: list[Hand]) -> _Norm
     jacobian = np.concatenate([by_pose, by_shape], axis=2)  # (V, 3, D + S)
     rows, right = [], []
 
-    def add(vertices: NDArray[np.intp], residual: Array, weight: Array, direction: Array | None) -> None:
+    def add(vertices: NDArray[Any], residual: Array, weight: Array, direction: Array | None) -> None:
         root = np.sqrt(weight)
         blocks = jacobian[vertices]
         if direction is None:

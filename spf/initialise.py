@@ -35,9 +35,11 @@ Progress = Callable[[str, float], None]
 
 DOUBTFUL = 0.42  # mean golden energy over the validation above which a start is not believed
 _SIDES: tuple[Side, Side] = ("right", "left")
-_CONVINCING = 0.30  # mean golden energy that ends the search at once …
-_CLEAR_MARGIN = 0.04  # … when the other side is this much worse
+_INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convinces
+_CONVINCING = 0.36  # mean golden energy that ends the search at once …
+_CLEAR_MARGIN = 0.03  # … when the other side is this much worse
 _VALIDATION_FRAMES = 16
+_GOOD_PLACE = 0.4  # golden energy under which no farther place is looked at
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
 _PER_SIDE = 4
@@ -127,19 +129,23 @@ def find_start(
     best: _Followed | None = None
     first = None
     for attempt, index in enumerate(_instants(frames)):
-        report("Looking for a hand", 0.15 * attempt)
+        if best is not None and attempt >= len(_INSTANTS):
+            break
+        report("Looking for a hand", min(0.2 * attempt, 0.5))
         hypotheses = _hypotheses(frames[index], sides, shape, rng)
         if not hypotheses:
             continue
         first = index if first is None else first
-        report("Following the hypotheses", 0.15 * attempt + 0.1)
+        report("Following the hypotheses", min(0.2 * attempt + 0.1, 0.6))
         followed = _best_followed(frames, index, hypotheses, shape, rng)
         if best is None or followed.energy < best.energy:
             best = followed
         if best.energy < _CONVINCING and best.margin > _CLEAR_MARGIN:
             break
     if best is None or first is None:
-        raise StartError("No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'.")
+        raise StartError(
+            "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
+        )
     if shape is None:
         best = _calibrated(frames, best, rng, report)
     index, pose, reference = _back_to(frames, first, best, rng)
@@ -149,7 +155,7 @@ def find_start(
 
 def _instants(frames: Sequence[Frame]) -> list[int]:
     """Frames to look for a hand in: some of the first second, then farther and farther apart until one shows a hand."""
-    instants = [index for index in (0, 10, 20, 30) if index < len(frames)]
+    instants = [index for index in _INSTANTS if index < len(frames)]
     far = 45
     while far < len(frames):
         instants.append(far)
@@ -218,6 +224,8 @@ def _hypotheses(
             for scale, pose, energy in locate(hand, observation, region.points, settings, rng):
                 base = shape or HandShape(side, scale=scale)
                 found.append(_Hypothesis(base, pose, energy))
+            if min((h.energy for h in found), default=1.0) < _GOOD_PLACE:
+                break
         result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
     least = min((h.energy for h in result), default=0.0)
     return [h for h in result if h.energy < 1.5 * least + 0.05]

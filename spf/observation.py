@@ -40,7 +40,7 @@ class Observation(NamedTuple):
     top: int
     depth: NDArray[np.float32]
     time: float
-    index: int
+    index: int  # type: ignore[assignment]  # a frame has an index; a tuple's method of that name is not missed
 
     @property
     def is_empty(self) -> bool:
@@ -133,13 +133,13 @@ def _measure(
     place[region.reshape(-1)[pixels]] = pixels
     nearest = place[region]
     filled = depth.reshape(-1)[nearest]
-    smooth = cv2.bilateralFilter(filled, 5, 0.008, 2.0)
+    smooth = np.asarray(cv2.bilateralFilter(filled, 5, 0.008, 2.0), dtype=np.float32)
     numbers = camera_numbers(camera)
     points, normals = np.empty((height * width, 3)), np.empty((height * width, 3))
     surface_points(smooth, numbers, points, normals)
     labels = mask.copy()
     labels[(mask == 0) & (depth > 0) & (depth < filled - _OCCLUDER_GAP)] = 2
-    grid = _grid(camera, smooth, labels, distance)
+    grid = _grid(camera, smooth, labels, np.asarray(distance, dtype=np.float32))
     arrays = ObservationArrays(numbers, points, normals, labels, nearest, pixels, *grid)
     return Observation(arrays, camera, left, top, np.where(mask, smooth, np.float32(0)), frame.time, frame.index)
 

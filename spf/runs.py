@@ -18,7 +18,6 @@ __all__ = ["Run", "RunWriter", "check_same_session", "read_run", "reopen_session
 
 MANIFEST, TRACK = "manifest.json", "track.parquet"
 _SAVED_EVERY = 200  # frames that a killed program loses at most
-_FRAME = 1.0 / 30.0  # s before the first frame at which its pose is taken to hold
 
 
 class Run(NamedTuple):
@@ -43,9 +42,8 @@ def track_plan(session: Session, plan: Plan) -> Iterator[TrackedFrame]:
     Raises:
         SessionError: a frame cannot be read.
     """
-    tracking, state = begin(plan.tracker, plan.settings, plan.start, plan.seed)
-    began = float(session.times[plan.start.frame]) - _FRAME
-    state = state._replace(filter=state.filter._replace(time=began))
+    began = float(session.times[plan.start.frame])
+    tracking, state = begin(plan.tracker, plan.settings, plan.start, plan.seed, time=began)
     joints = joints_of(tracking.hand, plan.start.pose, plan.start.reference)
     nan = float("nan")
     for index in range(plan.first, plan.start.frame):

@@ -196,16 +196,15 @@ def _offspring(
     digits = parents.digits[first].copy()
     for columns in digit_columns(hand):
         swap = rng.random(count) < 0.25
-        digits[np.ix_(swap, columns)] = parents.digits[np.ix_(second[swap], columns)]
+        rows = np.flatnonzero(swap)[:, None]
+        digits[rows, columns] = parents.digits[second[rows], columns]
     # each child changes in some of its parts only: a change of all at once is seldom for the better
     fan = np.where(rng.random(count) < 0.15, rng.normal(scale=0.3, size=count), 0.0)
     for finger in range(4):
         digits[:, 4 + 4 * finger] += _SPREAD[finger] * fan
     for columns in digit_columns(hand):
-        touched = rng.random(count) < 0.3
-        digits[np.ix_(touched, columns)] += rng.normal(
-            scale=0.08 + 0.5 * shrink, size=(int(touched.sum()), len(columns))
-        )
+        rows = np.flatnonzero(rng.random(count) < 0.3)[:, None]
+        digits[rows, columns] += rng.normal(scale=0.08 + 0.5 * shrink, size=(len(rows), len(columns)))
     turns = _shift_fingers(hand, digits, parents.turns[first], rng)
     turned = rng.random((count, 1)) < 0.5
     turn = Rotation.from_rotvec(turned * rng.normal(scale=0.03 + 0.4 * shrink, size=(count, 3)))

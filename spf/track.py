@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
 _FIRST_EFFORT = 3.0
+_FRAME = 1.0 / 30.0  # s
 _NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a lost hand is believed in, and how much it grows a frame
 
 
@@ -94,7 +95,7 @@ class TrackedFrame(NamedTuple):
         observation: what was seen; None while lost.
     """
 
-    index: int
+    index: int  # type: ignore[assignment]  # a frame has an index; a tuple's method of that name is not missed
     time: float
     pose: Array
     reference: Array
@@ -112,12 +113,12 @@ class TrackedFrame(NamedTuple):
 
 
 def begin(
-    tracker: str, settings: Settings, start: Start, seed: int, *, free_dip: bool = False
+    tracker: str, settings: Settings, start: Start, seed: int, *, time: float = 0.0, free_dip: bool = False
 ) -> tuple[Tracking, TrackState]:
-    """Set up a run from a first pose."""
+    """Set up a run from a first pose, which holds a thirtieth of a second before ``time``, its frame's, in seconds."""
     hand = start.shape.hand(free_dip=free_dip)
     tracking = Tracking(tracker, settings, start, hand, digit_spheres(hand), seed)
-    return tracking, _restart(tracking, start.pose, start.reference, -1.0 / 30.0)
+    return tracking, _restart(tracking, start.pose, start.reference, time - _FRAME)
 
 
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
@@ -174,7 +175,7 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     found = recover(frame, tracking.hand, limit, state.filter.estimate[:3], within, rng)
     if found is None:
         return state
-    return _restart(tracking, found, np.eye(3), frame.time - 1.0 / 30.0)._replace(history=state.history, lost=True)
+    return _restart(tracking, found, np.eye(3), frame.time - _FRAME)._replace(history=state.history, lost=True)
 
 
 def _usual(state: TrackState, tracking: Tracking) -> float:

@@ -56,7 +56,7 @@ def make_problem(
 ) -> Problem:
     """Set up the cost of a frame; draws the pool of observed pixels."""
     pixels = observation.arrays.pixels
-    chosen = rng.choice(len(pixels), size=min(pool, len(pixels)), replace=False) if len(pixels) else []
+    chosen = rng.permutation(len(pixels))[:pool]
     floor = np.array([10.0 * settings.points] * 3 + [0.01 * settings.points] * (hand.dofs - 3))
     return Problem(
         hand,

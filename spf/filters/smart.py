@@ -182,7 +182,9 @@ def step(
     log_weights = normalise(log_c + log_likelihood + _kept(settings))  # (e) weigh
     clock("weigh")
     estimate = weighted_mean(samples, log_weights)  # (f) estimate
-    estimate_energy, estimate_golden, estimate_overlap = (float(part[0]) for part in _judge(problem, estimate[None]))
+    judged = _judge(problem, estimate[None])
+    estimate_energy, estimate_golden, estimate_overlap = (float(part[0]) for part in judged)
+    estimate_log_likelihood = float(_log_likelihood(judged[0], judged[1], settings)[0])
     clock("estimate")
     velocities = (samples - np.concatenate([before, before])) / interval
     new = State(ParticleSet(samples, velocities, log_weights), state.reference, estimate, observation.time)
@@ -191,7 +193,7 @@ def step(
         state.reference, ancestors, origins, predicted, optimised, energy[:count], energy[count:], golden_energy, overlap,
         log_likelihood, log_c, log_weights, ess(log_weights), float(np.exp(log_weights[count:]).sum()), window,
         estimate, estimate_golden, estimate_overlap, estimate_energy,
-        float(_log_likelihood(estimate_energy, estimate_golden, settings)), trajectories,
+        estimate_log_likelihood, trajectories,
         iterations + screened + len(samples) + 1, clock.seconds,
     )  # fmt: skip
     return _recentred(new), info
@@ -236,7 +238,7 @@ def _correction(
     return window, log_correction(white, white_optimised, window)
 
 
-def _log_likelihood(energy: Array | float, golden_energy: Array | float, settings: SpfSettings) -> Array | float:
+def _log_likelihood(energy: Array, golden_energy: Array, settings: SpfSettings) -> Array:
     """log p(z|s) = -E/σ² (6), E joined by the rendered comparison; up to a constant."""
     return -(energy + settings.golden * settings.points * golden_energy) / settings.sigma2
 

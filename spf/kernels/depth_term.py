@@ -41,7 +41,6 @@ def depth_term(
     """Energy of the sampled model points; adds their wrenches to those of the bones."""
     movers, shares = surface.influence_bone, surface.shares
     camera, labels, nearest, points, normals = obs.camera, obs.labels, obs.nearest, obs.points, obs.normals
-    bind_normals = surface.normals
     height, width = labels.shape
     scale = weights.points / max(sample.shape[0], 1)
     per_area, stiffness = scale / (weights.length * weights.length), scale * weights.normal

@@ -31,8 +31,8 @@ __all__ = [
 
 FAR = np.float32(1e9)  # depth of a pixel that nothing covers
 
-FOREARM_RADIUS = 0.044  # m, of an adult's arm
-FOREARM_COST = 0.1
+FOREARM_RADIUS, FOREARM_TAPER = 0.032, 0.09  # m, of an adult's arm at the wrist, and its growth per metre up the arm
+FOREARM_COST = 0.15
 
 
 @part
@@ -119,7 +119,7 @@ def visible_vertices(points, normals, projected, depth, tolerance, perspective, 
             facing = normals[i, 2]
         if facing > -0.05:
             continue
-        u, v = int(round(projected[i, 0])), int(round(projected[i, 1]))
+        u, v = round(projected[i, 0]), round(projected[i, 1])
         if 0 <= u < width and 0 <= v < height and projected[i, 2] > depth[v, u] + tolerance:
             continue
         visible[count] = i
@@ -166,7 +166,7 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
 
     Over the overlap ``min(d², T²)/T²``; 1 for every hand pixel that the model leaves uncovered; ``outside`` (0-1) for every
     pixel that the model covers beside the hand; divided by the number of pixels of the union. Pixels labelled UNKNOWN
-    count nothing. Uncovered pixels beyond the wrist that lie in one tube as wide as an arm are the forearm and count
+    count nothing. Uncovered pixels beyond the wrist that lie in one cone as wide as an arm are the forearm and count
     FOREARM_COST each: a spread hand is no forearm.
 
     Args:
@@ -184,7 +184,6 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
     fx, fy, cx, cy, perspective = camera[0], camera[1], camera[2], camera[3], camera[4] != 0.0
     forearm, ax, ay, az = _forearm_axis(rendered, observed, labels, camera, wrist, axis)
     inverse = 1.0 / (truncation * truncation)
-    tube = (FOREARM_RADIUS * scale) ** 2
     total, union, both = 0.0, 0, 0
     for v in range(rendered.shape[0]):
         for u in range(rendered.shape[1]):
@@ -202,7 +201,8 @@ def compare_depth(rendered, observed, labels, outside, camera, wrist, axis, scal
                         dx, dy, dz = (u - cx) / fx * reach - wrist[0], (v - cy) / fy * reach - wrist[1], seen - wrist[2]
                         if beyond_wrist(dx, dy, dz, axis[0], axis[1], axis[2]):
                             along = dx * ax + dy * ay + dz * az
-                            if dx * dx + dy * dy + dz * dz - along * along < tube:
+                            radius = FOREARM_RADIUS * scale + FOREARM_TAPER * max(along, 0.0)
+                            if dx * dx + dy * dy + dz * dz - along * along < radius * radius:
                                 total += FOREARM_COST
                                 continue
                     total += 1.0

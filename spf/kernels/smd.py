@@ -75,7 +75,10 @@ def smd_update(pose, step, trace, gradient, product, meta_step, decay, first, lo
 
 
 @kernel
-def see(skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer, work, points, normals, projected, depth, coarse, visible):  # fmt: skip
+def see(
+    skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer,
+    work, points, normals, projected, depth, coarse, visible,
+):  # fmt: skip
     """Pose the skin and list the vertices of the hand that the camera sees in this pose; returns their number.
 
     Vertices past the wrist belong to the arm, which bends as the palm does not: they are never listed.
@@ -239,7 +242,7 @@ def smd_run(
                 first_step[d] = parameters.initial_step / (curvature[d] + floor[d])
                 step[d] = first_step[d]
         mean = 0.0
-        for inner in range(parameters.iterations):
+        for _ in range(parameters.iterations):
             for s in range(sample.shape[0]):
                 sample[s] = visible[draws[done, s] % count]
             for s in range(pixels.shape[0]):

@@ -1,0 +1,64 @@
+"""Weights, effective sample size, resampling and dynamics."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from spf.filters.dynamics import DynamicsSettings, noise_scale, predict
+from spf.filters.particles import ess, normalise, weighted_mean
+from spf.filters.resampling import systematic
+from spf.hand import load_hand
+
+_LOGS = st.lists(st.floats(-800, 800), min_size=1, max_size=30).map(np.array)
+
+
+@given(_LOGS, st.floats(-1e3, 1e3))
+def test_weights_do_not_depend_on_a_constant(logs: np.ndarray, constant: float) -> None:
+    np.testing.assert_allclose(np.exp(normalise(logs)), np.exp(normalise(logs + constant)), atol=1e-9)
+
+
+@given(_LOGS)
+def test_the_effective_sample_size_lies_between_1_and_n(logs: np.ndarray) -> None:
+    assert 1 - 1e-9 <= ess(normalise(logs)) <= len(logs) + 1e-6
+
+
+def test_equal_weights_have_full_effective_size() -> None:
+    np.testing.assert_allclose(ess(normalise(np.zeros(7))), 7.0)
+
+
+def test_weights_that_all_vanish_become_equal() -> None:
+    np.testing.assert_allclose(np.exp(normalise(np.full(4, -np.inf))), 0.25)
+
+
+@given(_LOGS, st.integers(0, 2**31))
+def test_systematic_resampling_draws_each_its_floor_or_its_ceiling(logs: np.ndarray, seed: int) -> None:
+    log_weights = normalise(logs)
+    count = 50
+    drawn = np.bincount(systematic(log_weights, count, np.random.default_rng(seed)), minlength=len(logs))
+    expected = count * np.exp(log_weights)
+    assert (drawn >= np.floor(expected - 1e-6)).all()
+    assert (drawn <= np.ceil(expected + 1e-6)).all()
+
+
+def test_systematic_resampling_is_unbiased(rng: np.random.Generator) -> None:
+    log_weights = normalise(np.log([0.05, 0.15, 0.8]))
+    drawn = sum(np.bincount(systematic(log_weights, 4, rng), minlength=3) for _ in range(4000))
+    np.testing.assert_allclose(drawn / 16000, [0.05, 0.15, 0.8], atol=0.01)
+
+
+def test_the_mean_is_weighted() -> None:
+    np.testing.assert_allclose(weighted_mean(np.array([[0.0], [4.0]]), np.log([0.25, 0.75])), [3.0])
+
+
+def test_prediction_moves_by_velocity_and_noise_within_the_limits(rng: np.random.Generator) -> None:
+    hand, settings = load_hand("right"), DynamicsSettings(velocity=1.0)
+    poses = np.tile(hand.neutral_pose(), (4000, 1))
+    velocities = np.zeros_like(poses)
+    velocities[:, 0] = 0.3
+    moved = predict(hand, poses, velocities, 1 / 30, settings, rng)
+    scale = noise_scale(hand, settings, 1 / 30)
+    np.testing.assert_allclose(moved[:, :3].mean(axis=0), [0.01, 0.0, 0.0], atol=5e-4)
+    np.testing.assert_allclose(moved[:, :6].std(axis=0), scale[:6], rtol=0.06)
+    assert (moved <= hand.limits[:, 1]).all()
+    assert (moved >= hand.limits[:, 0]).all()
+    np.testing.assert_allclose(noise_scale(hand, settings, 4 / 30), 2 * scale)
