@@ -42,7 +42,7 @@ class ThreeD:
         self._drawing: asyncio.Task[None] | None = None
         self._awaited = 0  # pictures sent to the browser that it has not shown yet
         self._all_shown = asyncio.Event()
-        state.param.watch(self.request, ["revision", "azimuth", "elevation", "zoom", "playing"])
+        state.param.watch(self.request, ["revision", "task", "azimuth", "elevation", "zoom", "playing"])
 
     def request(self, *_events: Any) -> None:
         """Have the present state drawn soon."""
@@ -119,6 +119,8 @@ class ThreeD:
         state = self._state
         if state.loss:
             return state.loss
+        if state.task and state.summary is None:
+            return f"{state.task} …"
         if state.origin is None:
             return "Press Start: the particles of each frame are drawn here."
         if state.summary is not None:

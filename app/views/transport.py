@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import panel as pn
 import panel_material_ui as pmu
+import param
 
 from app.controller import Controller
 from app.state import State
 
 __all__ = ["Transport"]
+
+# What the slider's throttled value is put back to after each jump, so that a jump to the same frame is an event again.
+# The value itself won't do: the browser echoes what the server sets, late, and that would be taken for a jump back.
+_NOWHERE = -1
 
 
 class Transport:
@@ -29,7 +33,8 @@ class Transport:
             sizing_mode="stretch_width", margin=(8, 18), size="small",
         )  # fmt: skip
         self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
-        self._slider.param.watch(self._on_slide, "value")
+        self._rearm()
+        self._slider.param.watch(self._on_slide, "value_throttled")
         state.param.watch(self._follow, ["session", "frame", "revision", "task", "playing", "origin"])
         self._follow()
         self.panel = pmu.Row(
@@ -48,9 +53,15 @@ class Transport:
         else:
             await self._controller.play()
 
-    def _on_slide(self, event: Any) -> None:
-        if event.new != self._state.frame:  # else the slider only follows
-            pn.state.execute(partial(self._controller.jump, event.new))
+    async def _on_slide(self, event: Any) -> None:
+        if event.new == _NOWHERE:
+            return
+        self._rearm()
+        await self._controller.jump(event.new)
+
+    def _rearm(self) -> None:
+        with param.edit_constant(self._slider):
+            self._slider.value_throttled = _NOWHERE
 
     def _follow(self, *_events: Any) -> None:
         state = self._state
