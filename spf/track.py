@@ -29,7 +29,6 @@ __all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "run", "track_fram
 Array = NDArray[np.float64]
 _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
-_DOUBT, _AGAIN = 5, 15  # poor frames in a row after which a better pose is searched for, and until it is again
 _FIRST_EFFORT = 3.0
 _FRAME = 1.0 / 30.0  # s
 _NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a lost hand is believed in, and how much it grows a frame
@@ -66,7 +65,6 @@ class TrackState(NamedTuple):
         fresh: whether the pose was just found and no frame has refined it.
         golden: golden energy of the last estimate; 1 when there is none.
         missing: frames since the hand was lost.
-        poor: frames in a row that are explained worse than a hand that is found would be.
     """
 
     filter: smart.State
@@ -76,7 +74,6 @@ class TrackState(NamedTuple):
     fresh: bool
     golden: float
     missing: int
-    poor: int
 
 
 class TrackedFrame(NamedTuple):
@@ -127,7 +124,7 @@ def begin(
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
     state = smart.start(tracking.hand, pose, reference, time_, count)
-    return TrackState(state, False, (), 0, True, 1.0, 0, 0)
+    return TrackState(state, False, (), 0, True, 1.0, 0)
 
 
 def track_frame(
@@ -147,7 +144,7 @@ def track_frame(
     began = time.perf_counter()
     rng = np.random.default_rng([tracking.seed, frame.index])
     was_lost = state.lost
-    if was_lost or (state.poor >= _DOUBT and (state.poor - _DOUBT) % _AGAIN == 0):
+    if was_lost:
         state = _sought(tracking, state, frame, rng)
     searched = time.perf_counter()
     observation = observe(frame, state.filter.estimate[:3], reach_of(tracking.hand))
@@ -179,7 +176,7 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     if found is None:
         return state
     fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
-    return fresh._replace(history=state.history, lost=state.lost)
+    return fresh._replace(history=state.history, lost=True)
 
 
 def _usual(state: TrackState, tracking: Tracking) -> float:
@@ -201,7 +198,7 @@ def _judged(tracking: Tracking, state: TrackState, filter_state: smart.State, in
     history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
     lost = poor if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
-    return TrackState(filter_state, lost, history, count, False, golden, missing, state.poor + 1 if poor else 0)
+    return TrackState(filter_state, lost, history, count, False, golden, missing)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:
