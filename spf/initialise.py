@@ -139,7 +139,9 @@ def find_start(
         if best.energy < _CONVINCING and best.margin > _CLEAR_MARGIN:
             break
     if best is None or first is None:
-        raise StartError("No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'.")
+        raise StartError(
+            "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
+        )
     if shape is None:
         best = _calibrated(frames, best, rng, report)
     index, pose, reference = _back_to(frames, first, best, rng)

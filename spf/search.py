@@ -198,7 +198,9 @@ def _offspring(
         digits[:, 4 + 4 * finger] += _SPREAD[finger] * fan
     for columns in digit_columns(hand):
         touched = rng.random(count) < 0.3
-        digits[np.ix_(touched, columns)] += rng.normal(scale=0.08 + 0.5 * shrink, size=(int(touched.sum()), len(columns)))
+        digits[np.ix_(touched, columns)] += rng.normal(
+            scale=0.08 + 0.5 * shrink, size=(int(touched.sum()), len(columns))
+        )
     turns = _shift_fingers(hand, digits, parents.turns[first], rng)
     turned = rng.random((count, 1)) < 0.5
     turn = Rotation.from_rotvec(turned * rng.normal(scale=0.03 + 0.4 * shrink, size=(count, 3)))
