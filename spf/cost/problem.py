@@ -1,4 +1,4 @@
-"""A cost to minimise: one hand, one observation, the weights of the terms, and a sample of pixels shared by all particles."""
+"""A cost to minimise: a hand, an observation, the weights of the terms, a sample of pixels shared by all particles."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from spf.cost.settings import CostSettings
 from spf.cost.spheres import digit_spheres
 from spf.hand.model import Hand
 from spf.kernels.cost import CostWeights, Spheres, allocate
-from spf.kernels.render import golden_energies
-from spf.kernels.smd import SmdParameters, evaluate_poses, match_pixels, see
+from spf.kernels.golden import golden_energies, make_canvas
+from spf.kernels.kinematics import make_chain
+from spf.kernels.sight import make_sight, match_pixels, see
+from spf.kernels.smd import Scratch, evaluate_poses, make_scratch
 from spf.observation import Observation
 
-__all__ = ["Correspondences", "Problem", "correspondences", "costs", "golden", "make_problem"]
+__all__ = ["Correspondences", "Problem", "correspondences", "costs", "golden", "make_problem", "scratch_of"]
 
 Array = NDArray[np.float64]
 GOLDEN_TRUNCATION = 0.04  # T, m
@@ -56,7 +58,9 @@ def make_problem(
 ) -> Problem:
     """Set up the cost of a frame; draws the pool of observed pixels."""
     pixels = observation.arrays.pixels
-    chosen = rng.permutation(len(pixels))[:pool]
+    chosen = (
+        rng.choice(len(pixels), size=min(pool, len(pixels)), replace=False) if len(pixels) else np.empty(0, np.intp)
+    )
     floor = np.array([10.0 * settings.points] * 3 + [0.01 * settings.points] * (hand.dofs - 3))
     return Problem(
         hand,
@@ -74,12 +78,10 @@ def make_problem(
 def costs(problem: Problem, poses: Array) -> Array:
     """E (3) of poses (N, D) on all the model points that the camera sees and the frame's pool of pixels, (N,)."""
     hand, energies = problem.hand, np.empty(len(poses))
-    parameters = SmdParameters(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0, 0, False, 0.0, problem.match_radius, bool(problem.settings.zbuffer)
-    )
     evaluate_poses(
         hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, problem.spheres, problem.observation.arrays,
-        problem.weights, parameters, np.ascontiguousarray(poses), problem.reference, problem.data_pool, energies,
+        problem.weights, bool(problem.settings.zbuffer), problem.match_radius,
+        np.ascontiguousarray(poses), problem.reference, problem.data_pool, scratch_of(problem), energies,
     )  # fmt: skip
     return energies
 
@@ -91,13 +93,24 @@ def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple
     """
     if scales is None:
         scales = np.ones(len(poses))
-    hand = problem.hand
+    hand, arrays = problem.hand, problem.observation.arrays
+    canvas = make_canvas(
+        len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(hand.proxy.vertices), *arrays.grid_depth.shape
+    )
     energies, overlaps = np.empty(len(poses)), np.empty(len(poses))
     golden_energies(
-        hand.skeleton, hand.proxy, hand.proxy_faces, problem.observation.arrays, np.ascontiguousarray(poses),
-        np.ascontiguousarray(scales), problem.reference, GOLDEN_TRUNCATION, energies, overlaps,
+        hand.skeleton, hand.proxy, hand.proxy_faces, arrays, np.ascontiguousarray(poses),
+        np.ascontiguousarray(scales), problem.reference, GOLDEN_TRUNCATION, canvas, energies, overlaps,
     )  # fmt: skip
     return energies, overlaps
+
+
+def scratch_of(problem: Problem, points: int = 0, data_points: int = 0) -> Scratch:
+    """Return what kernels need to work on a problem in one thread, for samples of the given sizes."""
+    hand, grid = problem.hand, problem.observation.arrays.grid_depth
+    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone), hand.dofs)
+    sight = make_sight(len(hand.skin.vertices), len(hand.proxy.vertices), *grid.shape)
+    return make_scratch(hand.dofs, points, data_points, len(problem.data_pool), work, sight)
 
 
 class Correspondences(NamedTuple):
@@ -115,21 +128,15 @@ class Correspondences(NamedTuple):
     matches: NDArray[np.int32]
 
 
-def correspondences(problem: Problem, pose: Array) -> Correspondences:
+def correspondences(problem: Problem, pose: Array, *, zbuffer: bool = True) -> Correspondences:
     """Pose the hand (D,), and find what the camera sees of it and which vertex each observed pixel belongs to."""
-    hand, arrays = problem.hand, problem.observation.arrays
-    count = len(hand.skin.vertices)
-    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone), hand.dofs)
-    vertices, normals = np.empty((count, 3)), np.empty((count, 3))
-    projected, coarse = np.empty((count, 3), np.float32), np.empty((len(hand.proxy.vertices), 3), np.float32)
-    depth, visible = np.empty(arrays.grid_depth.shape, np.float32), np.empty(count, np.int32)
-    seen = see(
-        hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, arrays, np.ascontiguousarray(pose), problem.reference,
-        True, work, vertices, normals, projected, depth, coarse, visible,
+    hand, arrays, p = problem.hand, problem.observation.arrays, np.ascontiguousarray(pose, dtype=np.float64)
+    chain = make_chain(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone))
+    sight = make_sight(len(hand.skin.vertices), len(hand.proxy.vertices), *arrays.grid_depth.shape)
+    count = see(
+        hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, arrays, p, problem.reference,
+        zbuffer, chain, sight,
     )  # fmt: skip
     matches = np.empty(len(problem.data_pool), np.int32)
-    match_pixels(
-        vertices, normals, visible, seen, arrays, work.chain.bones, np.ascontiguousarray(pose), problem.data_pool,
-        problem.match_radius, matches,
-    )  # fmt: skip
-    return Correspondences(vertices, normals, visible[:seen].copy(), matches)
+    match_pixels(sight, count, arrays, chain, p, problem.data_pool, problem.match_radius, matches)
+    return Correspondences(sight.points, sight.normals, sight.visible[:count].copy(), matches)

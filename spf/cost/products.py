@@ -7,13 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from spf.cost.problem import Problem
+from spf.cost.problem import Problem, correspondences, scratch_of
 from spf.errors import HandError
-from spf.hand.model import Hand
-from spf.kernels.cost import Spheres, Workspace, allocate, cost_products
+from spf.kernels.cost import cost_products
 from spf.kernels.curvature import gauss_newton_diagonal
-from spf.kernels.smd import match_pixels
-from spf.kernels.smd import see as see_kernel
 
 __all__ = ["Products", "Sample", "curvature", "products", "see"]
 
@@ -50,22 +47,8 @@ class Products(NamedTuple):
 
 def see(problem: Problem, pose: ArrayLike) -> Sample:
     """Return all vertices that the camera sees in a pose (D,), and the frame's pool of pixels with their matches."""
-    hand, obs, p = problem.hand, problem.observation.arrays, _checked(problem, pose)
-    vertices = len(hand.skin.vertices)
-    work = _workspace(hand, problem.spheres)
-    points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
-    projected = np.empty((vertices, 3), np.float32)
-    coarse = np.empty((len(hand.proxy.vertices), 3), np.float32)
-    depth = np.empty(obs.grid_depth.shape, np.float32)
-    visible, matches = np.empty(vertices, np.int32), np.empty(len(problem.data_pool), np.int32)
-    count = see_kernel(
-        hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, obs, p, problem.reference,
-        bool(problem.settings.zbuffer), work, points, normals, projected, depth, coarse, visible,
-    )  # fmt: skip
-    match_pixels(
-        points, normals, visible, count, obs, work.chain.bones, p, problem.data_pool, problem.match_radius, matches
-    )
-    return Sample(visible[:count].copy(), problem.data_pool, matches)
+    found = correspondences(problem, _checked(problem, pose), zbuffer=bool(problem.settings.zbuffer))
+    return Sample(found.visible, problem.data_pool, found.matches)
 
 
 def products(
@@ -90,7 +73,7 @@ def products(
         HandError: a pose has the wrong length or is not finite.
     """
     hand, p, v = problem.hand, _checked(problem, pose), _checked(problem, direction)
-    work = _workspace(hand, problem.spheres)
+    work = scratch_of(problem).work
     gradient, product = np.empty(hand.dofs), np.empty(hand.dofs)
     energy = cost_products(
         hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,
@@ -108,14 +91,9 @@ def curvature(problem: Problem, pose: ArrayLike, sample: Sample, *, precision: A
     gauss_newton_diagonal(
         hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,
         np.zeros(hand.dofs) if precision is None else _checked(problem, precision),
-        p, problem.reference, *sample, diagonal, _workspace(hand, problem.spheres),
+        p, problem.reference, *sample, diagonal, scratch_of(problem).work,
     )  # fmt: skip
     return diagonal
-
-
-def _workspace(hand: Hand, spheres: Spheres) -> Workspace:
-    """Return scratch for one thread."""
-    return allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(spheres.bone), hand.dofs)
 
 
 def _checked(problem: Problem, pose: ArrayLike) -> Array:

@@ -12,7 +12,8 @@ from spf.frame import Frame
 from spf.hand.kinematics import PosedHand, pose_hand
 from spf.hand.model import Hand
 from spf.initialise import reach_of
-from spf.kernels.render import compare_depth, project_vertices, rasterise
+from spf.kernels.golden import compare_depth
+from spf.kernels.render import project_vertices, rasterise
 from spf.observation import Observation, camera_numbers, observe
 
 __all__ = ["Agreement", "agreement_with_depth", "surface_distances"]

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import part
+from spf.kernels.compiling import index, part
 from spf.kernels.cost_inputs import CostWeights, Spheres
 from spf.kernels.kinematics import GRADIENT, PRODUCT, TWIST
 
@@ -24,7 +24,7 @@ _SAME_PLACE = 1e-10  # m²: no direction to push in
 def place_spheres(owners: NDArray[np.int32], centres: Array, size: int, bones: Array, places: Array) -> None:
     """Set the places (3, Q) of the first ``size`` spheres, from the palm's centre."""
     for q in range(size):
-        b, x, y, z = np.uint32(owners[q]), centres[q, 0], centres[q, 1], centres[q, 2]
+        b, x, y, z = index(owners[q]), centres[q, 0], centres[q, 1], centres[q, 2]
         places[0, q] = bones[b, 0] * x + bones[b, 1] * y + bones[b, 2] * z + bones[b, 3]
         places[1, q] = bones[b, 4] * x + bones[b, 5] * y + bones[b, 6] * z + bones[b, 7]
         places[2, q] = bones[b, 8] * x + bones[b, 9] * y + bones[b, 10] * z + bones[b, 11]
@@ -34,11 +34,11 @@ def place_spheres(owners: NDArray[np.int32], centres: Array, size: int, bones: A
 def touches(places: Array, radii: Array, a: int, first: int, last: int) -> bool:
     """Whether a sphere overlaps any of a range of others; a loop that the compiler vectorises."""
     x, y, z, r = places[0, a], places[1, a], places[2, a], radii[a]
-    least = 1.0
+    hits = 0
     for b in range(first, last):
         dx, dy, dz, reach = x - places[0, b], y - places[1, b], z - places[2, b], r + radii[b]
-        least = min(least, dx * dx + dy * dy + dz * dz - reach * reach)
-    return least < 0.0
+        hits += dx * dx + dy * dy + dz * dz < reach * reach
+    return hits > 0
 
 
 @part
@@ -50,7 +50,7 @@ def collision_term(spheres: Spheres, weights: CostWeights, bones: Array, places:
     place_spheres(owners, spheres.centre, size, bones, places)
     energy = 0.0
     for a in range(size):
-        first, last = np.uint32(partners[a, 0]), np.uint32(partners[a, 1])
+        first, last = index(partners[a, 0]), index(partners[a, 1])
         if not touches(places, radii, a, first, last):
             continue
         for b in range(first, last):
@@ -61,7 +61,7 @@ def collision_term(spheres: Spheres, weights: CostWeights, bones: Array, places:
             distance = math.sqrt(squared)
             dx, dy, dz, overlap = dx / distance, dy / distance, dz / distance, reach - distance
             energy += overlap * overlap
-            bone_a, bone_b = np.uint32(owners[a]), np.uint32(owners[b])
+            bone_a, bone_b = index(owners[a]), index(owners[b])
             rate = _approach(bones, bone_a, places, a, dx, dy, dz) - _approach(bones, bone_b, places, b, dx, dy, dz)
             _push_along(bones, bone_a, places, a, dx, dy, dz, -gain * overlap, gain * rate)
             _push_along(bones, bone_b, places, b, dx, dy, dz, gain * overlap, -gain * rate)

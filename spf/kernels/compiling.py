@@ -7,18 +7,28 @@ operations an array and call, on counters that all threads share.
 
 from __future__ import annotations
 
-from numba import njit
+from typing import Any
 
-__all__ = ["allocating", "kernel", "part", "strict_kernel"]
+import numba
+import numpy as np
+
+__all__ = ["allocating", "index", "kernel", "part", "strict_kernel"]
+
+_compile: Any = numba.njit  # its declared signature lacks some of the options
+_STRICT: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_FAST = _STRICT | {"fastmath": True}
 
 #: A kernel that may allocate arrays.
-allocating = njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+allocating: Any = _compile(**_FAST)
 
 #: A kernel that works in the arrays that it is given.
-kernel = njit(cache=True, nogil=True, fastmath=True, error_model="numpy", _nrt=False)
+kernel: Any = _compile(**_FAST, _nrt=False)
 
 #: A part of kernels: compiled into each of them.
-part = njit(cache=True, nogil=True, fastmath=True, error_model="numpy", forceinline=True, _nrt=False)
+part: Any = _compile(**_FAST, _nrt=False, forceinline=True)
 
 #: A kernel that keeps to IEEE arithmetic, because infinities or NaN may come in.
-strict_kernel = njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+strict_kernel: Any = _compile(**_STRICT, _nrt=False)
+
+#: An index that is not negative: numba does not look whether it counts from the end.
+index: Any = np.uint32

@@ -1,8 +1,8 @@
 """The cost E(p) with its gradient and Gauss-Newton product, all terms in one pass (spec 4; eq. 3-14, 22).
 
 Everything is evaluated at one pose for a sample of model points and a sample of observed pixels, with correspondences
-and tangent planes held fixed, as the paper does (eq. 7-11). Each term adds forces to the bones; the tree turns them into
-derivatives of the pose. Besides the terms of the other files,
+and tangent planes held fixed, as the paper does (eq. 7-11). Each term adds forces to the bones; the tree turns them
+into derivatives of the pose. Besides the terms of the other files,
 
     prior       ½ (p − p̄)ᵀ diag(π) (p − p̄)                        pull to the prediction
 """

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import part
+from spf.kernels.compiling import index, part
 from spf.kernels.cost_inputs import CostWeights, ObservationArrays
 from spf.kernels.robust import cauchy_sum, multiply
 from spf.kernels.skinning import Skin, carry, push
@@ -34,7 +34,7 @@ def coverage_term(
     for s in range(size):
         if matches[s] < 0:
             continue
-        i, p = np.uint32(matches[s]), np.uint32(pixels[s])
+        i, p = index(matches[s]), index(pixels[s])
         x, y, z, _, _, _, dx, dy, dz, _, _, _ = carry(movers, shares, bones, i)
         x, y, z = x + tx - points[p, 0], y + ty - points[p, 1], z + tz - points[p, 2]
         squared = x * x + y * y + z * z

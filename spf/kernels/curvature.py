@@ -1,7 +1,7 @@
 """Diagonal of the Gauss-Newton Hessian of the cost: what the first step sizes are scaled by (spec 5).
 
-``H_dd = Σ (column d of J)ᵀ H_E (column d of J)``. A point moves with the few joints above it, so its columns are summed up
-the tree, bone by bone, instead of taking D products with unit vectors.
+``H_dd = Σ (column d of J)ᵀ H_E (column d of J)``. A point moves with the few joints above it, so its columns are summed
+up the tree, bone by bone, instead of taking D products with unit vectors.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.kernels.collision_term import place_spheres, touches
-from spf.kernels.compiling import kernel, part
+from spf.kernels.compiling import index, kernel, part
 from spf.kernels.cost_inputs import HAND, UNKNOWN, CostWeights, ObservationArrays, Spheres, Workspace
 from spf.kernels.depth_term import pixel_of
 from spf.kernels.kinematics import Skeleton, pose_bones
@@ -34,7 +34,7 @@ def gauss_newton_diagonal(
     turns, owners = work.turns, skeleton.revolute_bone
     turns[:] = 0
     for r in range(owners.shape[0]):
-        turns[np.uint32(owners[r]) + 1] += 1
+        turns[index(owners[r]) + 1] += 1
     for b in range(1, turns.shape[0]):
         turns[b] += turns[b - 1]
     for d in range(diagonal.shape[0]):
@@ -55,7 +55,7 @@ def _add_columns(
     """Add what every joint above a bone does to the bone's share (P, w) of a place and N of a normal."""
     while bone > 0:
         for r in range(turns[bone], turns[bone + 1]):
-            d, gain, s = np.uint32(dofs[r]), gains[r], r + 3
+            d, gain, s = index(dofs[r]), gains[r], r + 3
             ax, ay, az = gain * screws[s, 0], gain * screws[s, 1], gain * screws[s, 2]
             columns[d, 0] += ay * pz - az * py + w * gain * screws[s, 3]
             columns[d, 1] += az * px - ax * pz + w * gain * screws[s, 4]
@@ -63,7 +63,7 @@ def _add_columns(
             columns[d, 3] += ay * nz - az * ny
             columns[d, 4] += az * nx - ax * nz
             columns[d, 5] += ax * ny - ay * nx
-        bone = np.uint32(parents[bone])
+        bone = index(parents[bone])
     for d in range(3):
         columns[d, d] += w
         ax, ay, az = screws[d, 0], screws[d, 1], screws[d, 2]
@@ -86,7 +86,7 @@ def _point_columns(
     columns[:] = 0.0
     x = y = z = mx = my = mz = 0.0
     for c in range(surface.influence_count[i]):
-        b, k = np.uint32(movers[i, c]), MOST_INFLUENCES * i + c
+        b, k = index(movers[i, c]), MOST_INFLUENCES * i + c
         px, py, pz, nx, ny, nz = bone_share(shares, k, bones, b)
         x, y, z, mx, my, mz = x + px, y + py, z + pz, mx + nx, my + ny, mz + nz
         _add_columns(parents, gains, dofs, turns, screws, b, px, py, pz, shares[k, 3], nx, ny, nz, columns)
@@ -105,12 +105,12 @@ def _of_model_points(
     per_area = scale / (weights.length * weights.length)
     behind, front, pull = weights.behind, weights.front, weights.pull
     for s in range(sample.shape[0]):
-        x, y, z, mx, my, mz = _point_columns(skeleton, surface, np.uint32(sample[s]), work)
+        x, y, z, mx, my, mz = _point_columns(skeleton, surface, index(sample[s]), work)
         x, y, z = x + pose[0], y + pose[1], z + pose[2]
         v, u = pixel_of(obs.camera, x, y, z, height, width)
         label = labels[v, u]
         if label == HAND:
-            p = np.uint32(v * width + u)
+            p = index(v * width + u)
             nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
             r = nx * (x - points[p, 0]) + ny * (y - points[p, 1]) + nz * (z - points[p, 2])
             w = 1.0 / (1.0 + r * r * (front if r > 0.0 else behind))
@@ -123,7 +123,7 @@ def _of_model_points(
                 turning = columns[d, 3] ** 2 + columns[d, 4] ** 2 + columns[d, 5] ** 2 - along * along
                 diagonal[d] += per_area * w * rate * rate + stiff * turning
         elif label != UNKNOWN:
-            p = np.uint32(obs.nearest[v, u])
+            p = index(obs.nearest[v, u])
             squared = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2
             _add_pull(columns, weights.background * per_area / (1.0 + squared * pull), diagonal)
 
@@ -147,8 +147,8 @@ def _of_pixels(
     for s in range(pixels.shape[0]):
         if matches[s] < 0:
             continue
-        x, y, z, _, _, _ = _point_columns(skeleton, surface, np.uint32(matches[s]), work)
-        p = np.uint32(pixels[s])
+        x, y, z, _, _, _ = _point_columns(skeleton, surface, index(matches[s]), work)
+        p = index(pixels[s])
         x, y, z = x + pose[0] - points[p, 0], y + pose[1] - points[p, 1], z + pose[2] - points[p, 2]
         _add_pull(columns, gain / (1.0 + (x * x + y * y + z * z) * pull), diagonal)
 
@@ -162,7 +162,7 @@ def _of_spheres(skeleton: Skeleton, spheres: Spheres, weights: CostWeights, work
     gain = weights.points * weights.collision / (weights.length * weights.length)
     place_spheres(owners, spheres.centre, owners.shape[0], work.chain.bones, places)
     for a in range(owners.shape[0]):
-        first, last = np.uint32(partners[a, 0]), np.uint32(partners[a, 1])
+        first, last = index(partners[a, 0]), index(partners[a, 1])
         if not touches(places, radii, a, first, last):
             continue
         for b in range(first, last):
@@ -170,10 +170,10 @@ def _of_spheres(skeleton: Skeleton, spheres: Spheres, weights: CostWeights, work
                 continue
             columns[:] = 0.0
             for end in range(2):
-                sign, q = (1.0, np.uint32(a)) if end == 0 else (-1.0, np.uint32(b))
+                sign, q = (1.0, index(a)) if end == 0 else (-1.0, index(b))
                 x, y, z = sign * places[0, q], sign * places[1, q], sign * places[2, q]
                 _add_columns(
-                    parents, gains, dofs, turns, screws, np.uint32(owners[q]), x, y, z, sign, 0.0, 0.0, 0.0, columns
+                    parents, gains, dofs, turns, screws, index(owners[q]), x, y, z, sign, 0.0, 0.0, 0.0, columns
                 )
             dx, dy, dz = places[0, a] - places[0, b], places[1, a] - places[1, b], places[2, a] - places[2, b]
             squared = dx * dx + dy * dy + dz * dz

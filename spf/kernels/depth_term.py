@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import part
+from spf.kernels.compiling import index, part
 from spf.kernels.cost_inputs import HAND, UNKNOWN, CostWeights, ObservationArrays
 from spf.kernels.robust import cauchy_sum, multiply
 from spf.kernels.skinning import Skin, carry, push
@@ -30,7 +30,7 @@ def pixel_of(camera: Array, x: float, y: float, z: float, height: int, width: in
     inverse = 1.0 / max(z, 1e-3) if camera[4] != 0.0 else 1.0
     u = min(max(int(x * inverse * camera[0] + camera[2] + 0.5), 0), width - 1)
     v = min(max(int(y * inverse * camera[1] + camera[3] + 0.5), 0), height - 1)
-    return np.uint32(v), np.uint32(u)
+    return index(v), index(u)
 
 
 @part
@@ -49,13 +49,13 @@ def depth_term(
     product = pull_product = 1.0
     tx, ty, tz, sx, sy, sz = pose[0], pose[1], pose[2], direction[0], direction[1], direction[2]
     for s in range(sample.shape[0]):
-        i = np.uint32(sample[s])
+        i = index(sample[s])
         x, y, z, mx, my, mz, dx, dy, dz, ex, ey, ez = carry(movers, shares, bones, i)
         x, y, z, dx, dy, dz = x + tx, y + ty, z + tz, dx + sx, dy + sy, dz + sz
         v, u = pixel_of(camera, x, y, z, height, width)
         label = labels[v, u]
         if label == HAND:
-            p = np.uint32(v * width + u)
+            p = index(v * width + u)
             nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
             r = nx * (x - points[p, 0]) + ny * (y - points[p, 1]) + nz * (z - points[p, 2])
             # n points to the camera: r > 0 is in front of the surface
@@ -78,10 +78,11 @@ def depth_term(
             push(
                 movers, shares, bones, i,
                 f * nx, f * ny, f * nz, gain * (ax - along * qx), gain * (ay - along * qy), gain * (az - along * qz),
-                h * nx, h * ny, h * nz, turn * (ex - turning * qx), turn * (ey - turning * qy), turn * (ez - turning * qz),
+                h * nx, h * ny, h * nz,
+                turn * (ex - turning * qx), turn * (ey - turning * qy), turn * (ez - turning * qz),
             )  # fmt: skip
         elif label != UNKNOWN:
-            p = np.uint32(nearest[v, u])
+            p = index(nearest[v, u])
             ax, ay, az = x - points[p, 0], y - points[p, 1], z - points[p, 2]
             squared = ax * ax + ay * ay + az * az
             factor = 1.0 + squared * pull

@@ -1,8 +1,8 @@
 """Forward kinematics of the bones and its derivative products (spec 2; eq. 1, 14, 22).
 
 All positions here are relative to the palm's centre ``p[0:3]`` until a point is placed in the camera frame: this keeps
-torques well scaled. Every degree of freedom is a rotation about a line, written as a screw ``ξ = (axis, origin × axis)``.
-It serves both products, which never build a 26-column Jacobian:
+torques well scaled. A degree of freedom is a rotation about a line, written as a screw ``ξ = (axis, origin × axis)``
+that serves both products, which never build a 26-column Jacobian:
 
     JVP:  twist of a bone  (ω, ν) = Σ ξ_d v_d    over the rotations above it; a point at x moves with ω × x + ν
     VJP:  g_d = ξ_d · (torque, force)            of all bones below it, summed up the tree
@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import allocating, part
+from spf.kernels.compiling import allocating, index, part
 
 __all__ = [
     "BONE_COLUMNS",
@@ -101,14 +101,14 @@ def pose_bones(skeleton: Skeleton, pose: Array, reference: Array, chain: Chain) 
     _pose_palm(pose, reference, rest, bones, screws)
     turn = 0
     for b in range(1, parents.shape[0]):
-        p = np.uint32(parents[b])
+        p = index(parents[b])
         for i in range(0, 12, 4):
             x, y, z = bones[p, i], bones[p, i + 1], bones[p, i + 2]
             for j in range(4):
                 bones[b, i + j] = x * rest[b, 0, j] + y * rest[b, 1, j] + z * rest[b, 2, j]
             bones[b, i + 3] += bones[p, i + 3]
         while turn < owners.shape[0] and owners[turn] == b:
-            axis = np.uint32(axes[turn])
+            axis = index(axes[turn])
             _screw(bones, b, axis, screws, turn + 3)
             _turn_columns(bones, b, axis, cosines[turn], sines[turn])
             turn += 1
@@ -118,7 +118,7 @@ def pose_bones(skeleton: Skeleton, pose: Array, reference: Array, chain: Chain) 
 def _cosines(gains: Array, dofs: NDArray[np.int32], pose: Array, angles: Array, cosines: Array, sines: Array) -> None:
     """cos and sin of all revolutes, in loops that the compiler vectorises."""
     for r in range(gains.shape[0]):
-        angles[r] = gains[r] * pose[np.uint32(dofs[r])]
+        angles[r] = gains[r] * pose[index(dofs[r])]
     for r in range(gains.shape[0]):
         cosines[r], sines[r] = _cos_sin(angles[r])
 
@@ -173,7 +173,7 @@ def _screw(bones: Array, b: int, axis: int, screws: Array, s: int) -> None:
 @part
 def _turn_columns(bones: Array, b: int, axis: int, c: float, s: float) -> None:
     """Right-multiply a bone's rotation by one about its own axis: two columns mix."""
-    i, j = np.uint32((axis + 1) % 3), np.uint32((axis + 2) % 3)
+    i, j = index((axis + 1) % 3), index((axis + 2) % 3)
     for row in range(0, 12, 4):
         x, y = bones[b, row + i], bones[b, row + j]
         bones[b, row + i] = c * x + s * y
@@ -194,11 +194,11 @@ def bone_twists(skeleton: Skeleton, direction: Array, chain: Chain) -> None:
         bones[0, TWIST + i] = a * screws[0, i] + b * screws[1, i] + c * screws[2, i]
     turn = 0
     for bone in range(1, parents.shape[0]):
-        p = np.uint32(parents[bone])
+        p = index(parents[bone])
         x, y, z = bones[p, TWIST], bones[p, TWIST + 1], bones[p, TWIST + 2]
         u, v, w = bones[p, TWIST + 3], bones[p, TWIST + 4], bones[p, TWIST + 5]
         while turn < owners.shape[0] and owners[turn] == bone:
-            rate = gains[turn] * direction[np.uint32(dofs[turn])]
+            rate = gains[turn] * direction[index(dofs[turn])]
             x += rate * screws[turn + 3, 0]
             y += rate * screws[turn + 3, 1]
             z += rate * screws[turn + 3, 2]
@@ -223,7 +223,7 @@ def joint_gradient(skeleton: Skeleton, chain: Chain, gradient: Array, product: A
     gains, dofs = skeleton.revolute_gain, skeleton.revolute_dof
     bones, screws = chain.bones, chain.screws
     for b in range(parents.shape[0] - 1, 0, -1):
-        p = np.uint32(parents[b])
+        p = index(parents[b])
         for i in range(GRADIENT, BONE_COLUMNS):
             bones[p, i] += bones[b, i]
     for i in range(3):
@@ -232,7 +232,7 @@ def joint_gradient(skeleton: Skeleton, chain: Chain, gradient: Array, product: A
         gradient[3 + i] += _work(screws, i, bones, 0, GRADIENT)
         product[3 + i] += _work(screws, i, bones, 0, PRODUCT)
     for r in range(owners.shape[0]):
-        b, d, gain = np.uint32(owners[r]), np.uint32(dofs[r]), gains[r]
+        b, d, gain = index(owners[r]), index(dofs[r]), gains[r]
         gradient[d] += gain * _work(screws, r + 3, bones, b, GRADIENT)
         product[d] += gain * _work(screws, r + 3, bones, b, PRODUCT)
 

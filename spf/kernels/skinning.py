@@ -5,8 +5,8 @@ A vertex is kept in the frame of every bone that moves it, times its weight ther
     x̂ = Σ R (w l) + w o          n̂ = m/‖m‖,  m = Σ R (w n)
 
 so that no skinning matrices are needed. A bone's share ``P = R (w l) + w o`` of the place and ``M = R (w n)`` of the
-normal also carry both derivative products: ``ω × P + w ν`` and ``ω × M`` for a twist, torque ``P × u + M × g`` and force
-``w u`` for forces u on the place and g on m.
+normal also carry both derivative products: ``ω × P + w ν`` and ``ω × M`` for a twist, torque ``P × u + M × g`` and
+force ``w u`` for forces u on the place and g on m.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import kernel, part
+from spf.kernels.compiling import index, kernel, part
 from spf.kernels.kinematics import BONE_COLUMNS, GRADIENT, PRODUCT, TWIST, Chain
 
 __all__ = [
@@ -84,10 +84,10 @@ def carry(
     """
     x = y = z = mx = my = mz = 0.0
     dx = dy = dz = ex = ey = ez = 0.0
-    c, follows = np.uint32(0), 1.0
+    c, follows = index(0), 1.0
     while follows > 0.0:
-        b, k = np.uint32(movers[i, c]), MOST_INFLUENCES * i + c
-        follows, c = shares[k, 7], np.uint32(c + 1)
+        b, k = index(movers[i, c]), MOST_INFLUENCES * i + c
+        follows, c = shares[k, 7], index(c + 1)
         px, py, pz, nx, ny, nz = bone_share(shares, k, bones, b)
         w, ax, ay, az = shares[k, 3], bones[b, TWIST], bones[b, TWIST + 1], bones[b, TWIST + 2]
         x, y, z, mx, my, mz = x + px, y + py, z + pz, mx + nx, my + ny, mz + nz
@@ -107,10 +107,10 @@ def push(
     vx: float, vy: float, vz: float, hx: float, hy: float, hz: float,
 ) -> None:  # fmt: skip
     """Add forces on vertex i to both wrenches of its bones: (u, v) on the place, (g, h) on the normal m."""
-    c, follows = np.uint32(0), 1.0
+    c, follows = index(0), 1.0
     while follows > 0.0:
-        b, k = np.uint32(movers[i, c]), MOST_INFLUENCES * i + c
-        follows, c = shares[k, 7], np.uint32(c + 1)
+        b, k = index(movers[i, c]), MOST_INFLUENCES * i + c
+        follows, c = shares[k, 7], index(c + 1)
         px, py, pz, nx, ny, nz = bone_share(shares, k, bones, b)
         w = shares[k, 3]
         bones[b, GRADIENT] += py * uz - pz * uy + ny * gz - nz * gy
@@ -156,7 +156,7 @@ def skin_velocities(surface: Skin, chain: Chain, translation: Array, point_rates
 
 @kernel
 def skin_forces(surface: Skin, chain: Chain, point_forces: Array, normal_forces: Array) -> None:
-    """Gather forces (V, 3) on all places and unit normals into the first wrench of the bones, which is cleared first."""
+    """Gather forces (V, 3) on all places and unit normals into the bones' first wrench; both are cleared before."""
     movers, shares, bones = surface.influence_bone, surface.shares, chain.bones
     for b in range(bones.shape[0]):
         for i in range(GRADIENT, BONE_COLUMNS):

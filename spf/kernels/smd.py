@@ -9,15 +9,19 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from spf.kernels.compiling import allocating, kernel, strict_kernel
-from spf.kernels.cost import allocate, cost_products
+from spf.kernels.compiling import allocating, index, kernel, part, strict_kernel
+from spf.kernels.cost import CostWeights, ObservationArrays, Spheres, Workspace, cost_products
 from spf.kernels.curvature import gauss_newton_diagonal
-from spf.kernels.kinematics import pose_bones
-from spf.kernels.render import beyond_wrist, project_skin, project_vertices, rasterise, visible_vertices
-from spf.kernels.skinning import skin
+from spf.kernels.kinematics import Skeleton
+from spf.kernels.sight import Sight, match_pixels, see
+from spf.kernels.skinning import Skin
 
-__all__ = ["SmdParameters", "match_pixels", "see", "smd_run", "smd_update"]
+__all__ = ["Scratch", "SmdParameters", "evaluate_poses", "make_scratch", "smd_run", "smd_update"]
+
+Array = NDArray[np.float64]
+_CURVATURE_POINTS = 120
 
 
 class SmdParameters(NamedTuple):
@@ -52,12 +56,16 @@ class SmdParameters(NamedTuple):
 
 
 @strict_kernel
-def smd_update(pose, step, trace, gradient, product, meta_step, decay, first, low, high, bound, limits):
+def smd_update(
+    pose: Array, step: Array, trace: Array, gradient: Array, product: Array, meta_step: float, decay: float,
+    first: bool, low: Array, high: Array, bound: Array, limits: Array,
+) -> None:  # fmt: skip
     """One SMD update in place, (19), (15), (23), (24), (21).
 
     Args:
         pose, step, trace: (D,) p, a and v, updated in place.
         gradient, product: (D,) g and H v at p.
+        meta_step, decay: μ and λ.
         first: whether this is the first iteration, a = a₀.
         low, high: (D,) bounds of a.
         bound: (D,) bound of a step's length per entry.
@@ -74,179 +82,141 @@ def smd_update(pose, step, trace, gradient, product, meta_step, decay, first, lo
         pose[d] = constrained
 
 
-@kernel
-def see(
-    skeleton, surface, proxy, proxy_faces, obs, pose, reference, zbuffer,
-    work, points, normals, projected, depth, coarse, visible,
-):  # fmt: skip
-    """Pose the skin and list the vertices that the camera sees in this pose; returns their number."""
-    pose_bones(skeleton, pose, reference, work.chain)
-    skin(surface, work.chain, pose, points, normals)
-    project_vertices(points, obs.grid_camera, projected)
-    if zbuffer:
-        project_skin(proxy, work.chain, 1.0, pose, obs.grid_camera, coarse)
-        rasterise(coarse, proxy_faces, depth)
-    else:
-        depth[:] = np.float32(1e9)
-    return visible_vertices(points, normals, projected, depth, 0.006, obs.grid_camera[4] != 0.0, visible)
+class Scratch(NamedTuple):
+    """What a run works in; one per thread.
 
-
-@kernel
-def match_pixels(points, normals, visible, count, obs, bones, pose, pixels, radius, matches):
-    """Match observed pixels with the nearest visible vertex; pixels of the forearm get -1.
-
-    The forearm is what lies beyond the wrist's plane in a wide cone around the palm's axis.
+    Attributes:
+        work, sight: of the cost, and of what is seen.
+        sample: (points,) model points of an iteration.
+        pixels, matches: (data_points,) observed pixels of an iteration, and their model points.
+        pool_matches: (n,) model points of the whole pool of observed pixels.
+        spread: (_CURVATURE_POINTS,) model points that the first step sizes are computed with.
+        gradient, product: (D,) g and H v.
+        step, trace: (D,) a and v.
+        first_step, low, high: (D,) a₀ and the bounds of a.
+        zeros: (D,).
     """
-    squared_radius = radius * radius
-    # wrist and palm axis (+z of the palm's frame points to the forearm)
-    wx, wy, wz = bones[0, 3] + pose[0], bones[0, 7] + pose[1], bones[0, 11] + pose[2]
-    ax, ay, az = bones[0, 2], bones[0, 6], bones[0, 10]
-    for s in range(pixels.shape[0]):
-        pixel = pixels[s]
-        x, y, z = obs.points[pixel, 0], obs.points[pixel, 1], obs.points[pixel, 2]
-        if beyond_wrist(x - wx, y - wy, z - wz, ax, ay, az, 0.01):
-            matches[s] = -1
-            continue
-        nx, ny, nz = obs.normals[pixel, 0], obs.normals[pixel, 1], obs.normals[pixel, 2]
-        best, least = -1, squared_radius
-        for c in range(count):
-            i = visible[c]
-            dx, dy, dz = points[i, 0] - x, points[i, 1] - y, points[i, 2] - z
-            squared = dx * dx + dy * dy + dz * dz
-            if squared < least:
-                # normals that disagree make a vertex farther
-                agree = normals[i, 0] * nx + normals[i, 1] * ny + normals[i, 2] * nz
-                squared += 0.0002 * (1.0 - agree)
-                if squared < least:
-                    best, least = i, squared
-        matches[s] = best
+
+    work: Workspace
+    sight: Sight
+    sample: NDArray[np.int32]
+    pixels: NDArray[np.int32]
+    matches: NDArray[np.int32]
+    pool_matches: NDArray[np.int32]
+    spread: NDArray[np.int32]
+    gradient: Array
+    product: Array
+    step: Array
+    trace: Array
+    first_step: Array
+    low: Array
+    high: Array
+    zeros: Array
 
 
 @allocating
+def make_scratch(dofs: int, points: int, data_points: int, pool: int, work: Workspace, sight: Sight) -> Scratch:
+    """Allocate a Scratch."""
+    return Scratch(
+        work,
+        sight,
+        np.zeros(points, np.int32),
+        np.zeros(min(data_points, pool), np.int32),
+        np.zeros(min(data_points, pool), np.int32),
+        np.zeros(pool, np.int32),
+        np.zeros(_CURVATURE_POINTS, np.int32),
+        np.zeros(dofs),
+        np.zeros(dofs),
+        np.zeros(dofs),
+        np.zeros(dofs),
+        np.zeros(dofs),
+        np.zeros(dofs),
+        np.zeros(dofs),
+        np.zeros(dofs),
+    )
+
+
+@kernel
 def evaluate_poses(
-    skeleton, surface, proxy, proxy_faces, spheres, obs, weights, parameters, poses, reference, data_pool, energies
-):  # fmt: skip
+    skeleton: Skeleton, surface: Skin, proxy: Skin, proxy_faces: NDArray[np.int32], spheres: Spheres,
+    obs: ObservationArrays, weights: CostWeights, zbuffer: bool, match_radius: float,
+    poses: Array, reference: Array, data_pool: NDArray[np.int32], scratch: Scratch, energies: Array,
+) -> None:  # fmt: skip
     """E of many poses (N, D) on all their visible vertices and the same observed pixels, without the prior's pull."""
-    dofs, vertices = poses.shape[1], surface.vertices.shape[0]
-    work = allocate(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0], spheres.bone.shape[0], dofs)
-    points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
-    projected = np.empty((vertices, 3), np.float32)
-    coarse = np.empty((proxy.vertices.shape[0], 3), np.float32)
-    depth = np.empty(obs.grid_depth.shape, np.float32)
-    visible, matches = np.empty(vertices, np.int32), np.empty(data_pool.shape[0], np.int32)
-    nothing, gradient, product = np.zeros(dofs), np.empty(dofs), np.empty(dofs)
+    work, sight, matches, zeros = scratch.work, scratch.sight, scratch.pool_matches, scratch.zeros
+    gradient, product = scratch.gradient, scratch.product
     for n in range(poses.shape[0]):
-        count = see(
-            skeleton, surface, proxy, proxy_faces, obs, poses[n], reference, parameters.zbuffer,
-            work, points, normals, projected, depth, coarse, visible,
-        )  # fmt: skip
-        match_pixels(
-            points,
-            normals,
-            visible,
-            count,
-            obs,
-            work.chain.bones,
-            poses[n],
-            data_pool,
-            parameters.match_radius,
-            matches,
-        )
+        count = see(skeleton, surface, proxy, proxy_faces, obs, poses[n], reference, zbuffer, work.chain, sight)
+        match_pixels(sight, count, obs, work.chain, poses[n], data_pool, match_radius, matches)
         energies[n] = cost_products(
-            skeleton, surface, spheres, obs, weights, nothing, nothing,
-            poses[n], reference, visible[:count], data_pool, matches, nothing, gradient, product, work,
+            skeleton, surface, spheres, obs, weights, zeros, zeros,
+            poses[n], reference, sight.visible[:count], data_pool, matches, zeros, gradient, product, work,
         )  # fmt: skip
 
 
-@allocating
+@kernel
 def smd_run(
-    skeleton, surface, proxy, proxy_faces, spheres, limits, obs, weights, parameters,
-    start, reference, prior, precision, bound, floor, draws, data_pool, result, trace_pose, trace_cost, trace_step,
-):  # fmt: skip
+    skeleton: Skeleton, surface: Skin, proxy: Skin, proxy_faces: NDArray[np.int32], spheres: Spheres, limits: Array,
+    obs: ObservationArrays, weights: CostWeights, parameters: SmdParameters,
+    start: Array, reference: Array, prior: Array, precision: Array, bound: Array, floor: Array,
+    draws: NDArray[np.uint32], data_pool: NDArray[np.int32], scratch: Scratch,
+    result: Array, trace_pose: Array, trace_cost: Array, trace_step: Array,
+) -> int:  # fmt: skip
     """Run SMD from ``start``; writes the final pose into ``result``.
 
     Args:
+        skeleton, surface, proxy, proxy_faces, spheres, limits: the hand.
+        obs, weights, parameters: what it is compared with, and how.
+        start, reference: (D,) and (3, 3) R_ref.
+        prior, precision: (D,) p̄ and π.
         bound: (D,) bound of a step's length.
         floor: (D,) least curvature per entry, which bounds a₀.
-        draws: (rounds · iterations, points + data_points) uint32 random numbers.
-        data_pool: (n,) int32 observed pixels that the coverage term samples from.
+        draws: (rounds · iterations, points + data_points) random numbers.
+        data_pool: (n,) observed pixels that the coverage term samples from.
+        scratch: to work in.
+        result: (D,) out.
         trace_pose, trace_cost, trace_step: (iterations + 1, …) out, recorded when not empty.
 
     Returns:
         Number of iterations run.
     """
-    dofs = start.shape[0]
-    vertices = surface.vertices.shape[0]
-    work = allocate(skeleton.parent.shape[0], skeleton.revolute_bone.shape[0], spheres.bone.shape[0], dofs)
-    points, normals = np.empty((vertices, 3)), np.empty((vertices, 3))
-    projected = np.empty((vertices, 3), np.float32)
-    coarse = np.empty((proxy.vertices.shape[0], 3), np.float32)
-    depth = np.empty(obs.grid_depth.shape, np.float32)
-    visible = np.empty(vertices, np.int32)
-    pool_matches = np.empty(data_pool.shape[0], np.int32)
-    sample = np.empty(parameters.points, np.int32)
-    pixels = np.empty(min(parameters.data_points, data_pool.shape[0]), np.int32)
-    matches = np.empty(pixels.shape[0], np.int32)
-    gradient, product, curvature = np.empty(dofs), np.empty(dofs), np.empty(dofs)
-    step, trace, first_step = np.empty(dofs), np.zeros(dofs), np.empty(dofs)
-    low, high = np.empty(dofs), np.empty(dofs)
+    work, sight, sample, pixels, matches = scratch.work, scratch.sight, scratch.sample, scratch.pixels, scratch.matches
+    pool_matches, step, trace, first_step = scratch.pool_matches, scratch.step, scratch.trace, scratch.first_step
+    gradient, product, low, high = scratch.gradient, scratch.product, scratch.low, scratch.high
     recording = trace_cost.shape[0] > 0
-    result[:] = start
+    for d in range(step.shape[0]):
+        result[d], trace[d] = start[d], 0.0
     total = parameters.rounds * parameters.iterations
     previous, done = 1e300, 0
     for turn in range(parameters.rounds):
         count = see(
-            skeleton, surface, proxy, proxy_faces, obs, result, reference, parameters.zbuffer,
-            work, points, normals, projected, depth, coarse, visible,
-        )  # fmt: skip
+            skeleton, surface, proxy, proxy_faces, obs, result, reference, parameters.zbuffer, work.chain, sight
+        )
         if count == 0:
             break
-        if pixels.shape[0] > 0:
-            match_pixels(
-                points,
-                normals,
-                visible,
-                count,
-                obs,
-                work.chain.bones,
-                result,
-                data_pool,
-                parameters.match_radius,
-                pool_matches,
-            )
+        match_pixels(sight, count, obs, work.chain, result, data_pool, parameters.match_radius, pool_matches)
         if turn == 0:
-            many = min(count, 120)
-            spread = np.empty(many, np.int32)
-            for s in range(many):
-                spread[s] = visible[(s * count) // many]
+            spread = scratch.spread[: _spread(sight.visible, count, scratch.spread)]
             gauss_newton_diagonal(
                 skeleton, surface, spheres, obs, weights, precision,
-                result, reference, spread, data_pool, pool_matches, curvature, work,
+                result, reference, spread, data_pool, pool_matches, first_step, work,
             )  # fmt: skip
-            for d in range(dofs):
-                first_step[d] = parameters.initial_step / (curvature[d] + floor[d])
+            for d in range(step.shape[0]):
+                first_step[d] = parameters.initial_step / (first_step[d] + floor[d])
                 step[d] = first_step[d]
         mean = 0.0
         for _ in range(parameters.iterations):
-            for s in range(sample.shape[0]):
-                sample[s] = visible[draws[done, s] % count]
-            for s in range(pixels.shape[0]):
-                at = draws[done, sample.shape[0] + s] % data_pool.shape[0]
-                pixels[s], matches[s] = data_pool[at], pool_matches[at]
+            _draw_sample(draws, done, sight.visible, count, data_pool, pool_matches, sample, pixels, matches)
             energy = cost_products(
                 skeleton, surface, spheres, obs, weights, prior, precision,
                 result, reference, sample, pixels, matches, trace, gradient, product, work,
             )  # fmt: skip
-            most = parameters.most
-            if parameters.anneal and 2 * done > total:
-                most = parameters.most * (0.1 / parameters.most) ** (2.0 * done / total - 1.0)
-            for d in range(dofs):
+            most = _most_step(parameters, done, total)
+            for d in range(step.shape[0]):
                 low[d] = min(parameters.least, most) * first_step[d]
                 high[d] = most * first_step[d]
             if recording:
-                trace_pose[done] = result
-                trace_cost[done] = energy
-                trace_step[done] = step
+                _record(done, result, energy, step, trace_pose, trace_cost, trace_step)
             smd_update(
                 result, step, trace, gradient, product, parameters.meta_step, parameters.decay,
                 done == 0, low, high, bound, limits,
@@ -258,7 +228,47 @@ def smd_run(
             break
         previous = mean
     if recording:
-        trace_pose[done] = result
-        trace_step[done] = step
-        trace_cost[done] = trace_cost[done - 1] if done > 0 else 0.0
+        last = trace_cost[done - 1] if done > 0 else 0.0
+        _record(done, result, last, step, trace_pose, trace_cost, trace_step)
     return done
+
+
+@part
+def _record(
+    at: int, pose: Array, energy: float, step: Array, trace_pose: Array, trace_cost: Array, trace_step: Array
+) -> None:
+    """Write one row of the trajectory."""
+    trace_cost[at] = energy
+    for d in range(pose.shape[0]):
+        trace_pose[at, d], trace_step[at, d] = pose[d], step[d]
+
+
+@part
+def _draw_sample(
+    draws: NDArray[np.uint32], iteration: int, visible: NDArray[np.int32], count: int,
+    data_pool: NDArray[np.int32], pool_matches: NDArray[np.int32],
+    sample: NDArray[np.int32], pixels: NDArray[np.int32], matches: NDArray[np.int32],
+) -> None:  # fmt: skip
+    """Draw an iteration's model points among the visible ones, and its pixels from the pool."""
+    for s in range(sample.shape[0]):
+        sample[s] = visible[draws[iteration, s] % index(count)]
+    for s in range(pixels.shape[0]):
+        at = draws[iteration, sample.shape[0] + s] % index(data_pool.shape[0])
+        pixels[s], matches[s] = data_pool[at], pool_matches[at]
+
+
+@part
+def _spread(visible: NDArray[np.int32], count: int, spread: NDArray[np.int32]) -> int:
+    """Choose visible vertices evenly, as many as there is room for; returns their number."""
+    many = min(count, spread.shape[0])
+    for s in range(many):
+        spread[s] = visible[index(s * count // many)]
+    return many
+
+
+@part
+def _most_step(parameters: SmdParameters, done: int, total: int) -> float:
+    """Upper bound of a/a₀; with annealing it falls to a tenth over the second half."""
+    if parameters.anneal and 2 * done > total:
+        return parameters.most * (0.1 / parameters.most) ** (2.0 * done / total - 1.0)
+    return parameters.most

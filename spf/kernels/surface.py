@@ -28,8 +28,8 @@ def depth_in_sphere(depth, camera, centre, radius, mask):
 def surface_points(depth, camera, points, normals):
     """Back-project every pixel and take its unit normal from 3×3 Sobel differences, turned towards the camera.
 
-    With the differences ``X_u``, ``X_v`` of the back-projected points, ``n ∝ X_v × X_u``: for an orthographic camera this
-    is ``n ∝ (∂Z/∂x, ∂Z/∂y, −1)``.
+    With the differences ``X_u``, ``X_v`` of the back-projected points, ``n ∝ X_v × X_u``: for an orthographic camera
+    this is ``n ∝ (∂Z/∂x, ∂Z/∂y, −1)``.
 
     Args:
         depth: (H, W) float32 m, without gaps: pixels beside the hand hold the depth of the nearest hand pixel.

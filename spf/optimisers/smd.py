@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.cost.problem import Problem
+from spf.cost.problem import Problem, scratch_of
 from spf.kernels.smd import SmdParameters, smd_run
 from spf.settings import Settings, setting
 
@@ -101,7 +101,8 @@ def optimise(
         problem.observation.arrays, problem.weights, parameters,
         np.ascontiguousarray(start), problem.reference,
         start if prior is None else prior, np.zeros(dofs) if precision is None else precision,
-        step_bounds(dofs), problem.curvature_floor, draws, pool, result, *trace,
+        step_bounds(dofs), problem.curvature_floor, draws, pool,
+        scratch_of(problem, parameters.points, parameters.data_points), result, *trace,
     )  # fmt: skip
     cut = SmdTrace(*(part[: done + 1] for part in trace)) if record else None
     return result, cut, int(done)

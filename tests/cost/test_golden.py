@@ -8,7 +8,8 @@ import pytest
 from spf.cost.problem import GOLDEN_TRUNCATION, Problem, costs, golden
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import load_hand
-from spf.kernels.render import FOREARM_COST, FOREARM_RADIUS, compare_depth, project_vertices, rasterise
+from spf.kernels.golden import FOREARM_COST, FOREARM_RADIUS, compare_depth
+from spf.kernels.render import project_vertices, rasterise
 from tests.scenes import CAMERAS, FACING, hand_problem, natural_pose
 
 

@@ -8,18 +8,11 @@ import pytest
 from spf.frame import Camera
 from spf.hand import Hand, load_hand
 from spf.hand.kinematics import PosedHand, pose_hand
+from spf.kernels.cost_inputs import EMPTY, HAND, UNKNOWN
+from spf.kernels.golden import compare_depth
 from spf.kernels.kinematics import make_chain, pose_bones
-from spf.kernels.render import (
-    EMPTY,
-    FAR,
-    HAND,
-    UNKNOWN,
-    compare_depth,
-    project_skin,
-    project_vertices,
-    rasterise,
-    visible_vertices,
-)
+from spf.kernels.render import FAR, project_skin, project_vertices, rasterise
+from spf.kernels.sight import visible_vertices
 from tests.reference.ray_casting import cast_rays
 
 PINHOLE = Camera(56, 48, 110.0, 112.0, 27.3, 23.8)
@@ -111,11 +104,9 @@ def test_the_nearer_of_two_triangles_wins_whatever_their_order() -> None:
 
 class TestVisibility:
     def visible(self, hand: Hand, posed: PosedHand, camera: Camera) -> np.ndarray:
-        projected, depth = draw(posed.vertices, hand.faces, camera)
+        _, depth = draw(posed.vertices, hand.faces, camera)
         found = np.empty(len(posed.vertices), np.int32)
-        count = visible_vertices(
-            posed.vertices, posed.normals, projected, depth, 0.003, camera.model == "pinhole", found
-        )
+        count = visible_vertices(posed.vertices, posed.normals, numbers(camera), depth, 0.003, found)
         seen = np.zeros(len(posed.vertices), dtype=bool)
         seen[found[:count]] = True
         return seen
