@@ -8,7 +8,7 @@ import pytest
 from spf.cost.problem import GOLDEN_TRUNCATION, Problem, costs, golden
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import load_hand
-from spf.kernels.golden import FOREARM_COST, FOREARM_RADIUS, compare_depth
+from spf.kernels.golden import FOREARM_COST, FOREARM_RADIUS, FOREARM_TAPER, compare_depth
 from spf.kernels.render import project_vertices, rasterise
 from tests.scenes import CAMERAS, FACING, hand_problem, natural_pose
 
@@ -71,16 +71,17 @@ def test_comparison_agrees_with_its_formula(rng: np.random.Generator) -> None:
     away = np.stack([(u - 8) / 50 * observed, (v - 6) / 55 * observed, observed], axis=-1) - wrist
     along = away @ axis
     across = np.linalg.norm(away - along[..., None] * axis, axis=-1)
-    beyond = (along >= 0.01) & (across < 0.045 + 1.2 * along)
+    beyond = (along >= -0.004) & (across < 0.045 + 1.2 * along)
     arm = away[~covered & seen & beyond].sum(axis=0)
     arm /= np.linalg.norm(arm)
     from_arm = np.linalg.norm(away - (away @ arm)[..., None] * arm, axis=-1)
-    forearm = ~covered & seen & beyond & (from_arm < FOREARM_RADIUS * scale)
+    cone = FOREARM_RADIUS * scale + FOREARM_TAPER * np.maximum(away @ arm, 0)
+    forearm = ~covered & seen & beyond & (from_arm < cone)
     squared = ((rendered.astype(float) - observed) / GOLDEN_TRUNCATION) ** 2
     both, missed, beside = covered & seen, ~covered & seen & ~forearm, covered & empty
     total = np.minimum(squared[both], 1).sum() + missed.sum() + outside[beside].sum() + FOREARM_COST * forearm.sum()
     union = both.sum() + missed.sum() + beside.sum()
-    assert forearm.sum() > 3
+    assert forearm.sum() > 2
     assert found == pytest.approx((total / union, both.sum() / union), rel=1e-5)
 
 
