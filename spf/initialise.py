@@ -127,7 +127,6 @@ def find_start(
     report = progress or (lambda _text, _share: None)
     sides = (shape.side,) if shape else (side,) if side else _SIDES
     best: _Followed | None = None
-    first = None
     for attempt, index in enumerate(_instants(frames)):
         if best is not None and attempt >= len(_INSTANTS):
             break
@@ -135,20 +134,19 @@ def find_start(
         hypotheses = _hypotheses(frames[index], sides, shape, rng)
         if not hypotheses:
             continue
-        first = index if first is None else first
         report("Following the hypotheses", min(0.2 * attempt + 0.1, 0.6))
         followed = _best_followed(frames, index, hypotheses, shape, rng)
         if best is None or followed.energy < best.energy:
             best = followed
         if best.energy < _CONVINCING and best.margin > _CLEAR_MARGIN:
             break
-    if best is None or first is None:
+    if best is None:
         raise StartError(
             "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
         )
     if shape is None:
         best = _calibrated(frames, best, rng, report)
-    index, pose, reference = _back_to(frames, first, best, rng)
+    index, pose, reference = _first_held(frames, best, rng)
     report("Ready", 1.0)
     return Start(index, pose, reference, best.shape, best.energy, best.margin)
 
@@ -193,18 +191,17 @@ def _best_followed(
     return _Followed(index, chosen.shape, chosen.pose, np.eye(3), energy, min(others) - energy if others else 1.0)
 
 
-def _back_to(
-    frames: Sequence[Frame], first: int, start: _Followed, rng: np.random.Generator
-) -> tuple[int, Array, Array]:
-    """Track backwards from where the start was found to the first frame with a hand: (frame, pose, reference)."""
-    if start.frame == first:
-        return first, start.pose, start.reference
-    backwards = [frames[index]._replace(time=-frames[index].time) for index in range(start.frame, first - 1, -1)]
+def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator) -> tuple[int, Array, Array]:
+    """Track backwards from where the start was found for as long as the hand is there: (frame, pose, reference)."""
+    backwards = [frames[index]._replace(time=-frames[index].time) for index in range(start.frame, -1, -1)]
+    held, pose, reference = start.frame, start.pose, start.reference
     tracked = _track(_Hypothesis(start.shape, start.pose, start.energy), backwards, rng, start.reference)
-    if len(tracked) < len(backwards) or tracked[-1][2].estimate_golden > 1.5 * start.energy + 0.1:
-        return start.frame, start.pose, start.reference
-    state = tracked[-1][1]
-    return first, state.estimate, state.reference
+    for back, (_, state, info) in enumerate(tracked):
+        if back > 0:
+            if info.estimate_golden > 1.5 * start.energy + 0.1:
+                break
+            held, pose, reference = start.frame - back, state.estimate, state.reference
+    return held, pose, reference
 
 
 def _hypotheses(
