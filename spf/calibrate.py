@@ -23,7 +23,7 @@ from spf.observation import Observation
 from spf.optimisers.smd import SmdSettings, optimise
 from spf.parallel import map_threads
 
-__all__ = ["View", "fit_shape"]
+__all__ = ["View", "fit_shape", "size_by_render"]
 
 Array = NDArray[np.float64]
 
@@ -33,6 +33,8 @@ _NAMES = len(_PRIOR_SPREAD)
 _POOL = 250
 _BACKGROUND = 0.2
 _DELTA = 1e-3
+_SIZES = (0.88, 0.91, 0.94, 0.97, 1.0, 1.03)
+_AS_GOOD = 1.03
 
 
 class View(NamedTuple):
@@ -47,6 +49,33 @@ class View(NamedTuple):
     observation: Observation
     pose: Array
     reference: Array
+
+
+def size_by_render(
+    views: list[View], shape: HandShape, rng: np.random.Generator
+) -> tuple[HandShape, list[View], float]:
+    """Choose the scale whose render explains the views best, the smallest of those that do it about equally well.
+
+    Gauss-Newton swells the hand a little, because an uncovered pixel pulls harder than a model point beside the hand.
+
+    Returns:
+        (shape, views with their poses in that shape, mean golden energy).
+    """
+    settings, descent = CostSettings(), SmdSettings()
+    tried: list[tuple[HandShape, list[View], float]] = []
+    for factor in _SIZES:
+        sized = shape._replace(scale=shape.scale * factor)
+        hand = sized.hand()
+        posed = _repose(_repose(views, hand, settings, descent, rng), hand, settings, descent, rng)
+        tried.append((sized, posed, _mean_golden(posed, hand, settings, rng)))
+    least = min(energy for _, _, energy in tried)
+    return next(one for one in tried if one[2] < _AS_GOOD * least)
+
+
+def _mean_golden(views: list[View], hand: Hand, settings: CostSettings, rng: np.random.Generator) -> float:
+    problems = [make_problem(hand, view.observation, settings, view.reference, rng) for view in views]
+    energies = [golden(problem, view.pose[None])[0][0] for problem, view in zip(problems, views, strict=True)]
+    return float(np.mean(energies))
 
 
 class _Normal(NamedTuple):
@@ -95,11 +124,7 @@ def fit_shape(
         views = _repose(views, _shape(first, parameters).hand(), settings, descent, rng)
     shape = _shape(first, parameters)
     hand = shape.hand()
-    energies = [
-        golden(make_problem(hand, view.observation, settings, view.reference, rng), view.pose[None])[0][0]
-        for view in views
-    ]
-    return shape, views, float(np.mean(energies))
+    return shape, views, _mean_golden(views, hand, settings, rng)
 
 
 def _parameters(shape: HandShape) -> Array:

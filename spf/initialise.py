@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.calibrate import View, fit_shape
+from spf.calibrate import View, fit_shape, size_by_render
 from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.errors import StartError
@@ -345,6 +345,8 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
         shape, views, energy = fit_shape(views, shape, rng, iterations=8, refine=refine_all)
         pose = _relative_to_camera(views[0])
+    shape, views, energy = size_by_render(views, shape, rng)
+    pose = _relative_to_camera(views[0])
     return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy))
 
 
