@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from spf.cost.problem import Problem, golden, make_problem
+from spf.cost.spheres import digit_spheres
 from spf.filters import smart
 from spf.initialise import reach_of
 from spf.observation import observe
@@ -57,12 +58,14 @@ def _frame(session: SyntheticSession, settings: smart.SpfSettings, frames: int) 
     assert first.truth.pose is not None
     assert first.truth.orientation is not None
     state = smart.start(session.hand, first.truth.pose, first.truth.orientation, -1 / 30, settings.n)
+    spheres = digit_spheres(session.hand)
     totals, stages = [], []
     for frame in [session[index] for index in range(frames)]:
         began = time.perf_counter()
         observation = observe(frame, state.estimate[:3], reach_of(session.hand))
         observed = time.perf_counter() - began
-        state, info = smart.step(np.random.default_rng(frame.index), state, observation, session.hand, settings)
+        rng = np.random.default_rng(frame.index)
+        state, info = smart.step(rng, state, observation, session.hand, settings, spheres=spheres)
         totals.append(time.perf_counter() - began)
         stages.append({"observe": observed, **info.timings})
     return float(np.median(totals)), {name: float(np.median([s[name] for s in stages])) for name in stages[0]}
