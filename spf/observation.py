@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spf.frame import Camera, Frame
-from spf.kernels.cost import ObservationArrays
-from spf.kernels.surface import depth_in_sphere, surface_points
+from spf.kernels.cost_inputs import NORMAL, SURFACE_COLUMNS, UNKNOWN, ObservationArrays
+from spf.kernels.surface import coarse_grid, fill_holes, foreground, nearest_pixels, surface_points
 
 __all__ = ["Observation", "camera_numbers", "observe"]
+
+Mask = NDArray[np.uint8]
 
 GRID_CELLS = 80 * 60
 OUTSIDE_RAMP = 0.005  # m beside the hand at which covering a cell costs its full 1
@@ -50,7 +52,7 @@ class Observation(NamedTuple):
     @property
     def hand_points(self) -> NDArray[np.float64]:
         """The observed points (M, 3), m."""
-        return self.arrays.points[self.arrays.pixels]
+        return self.arrays.points[self.arrays.pixels].astype(np.float64)
 
 
 def camera_numbers(camera: Camera) -> NDArray[np.float64]:
@@ -71,20 +73,32 @@ def observe(frame: Frame, centre: ArrayLike, radius: float, plane: ArrayLike | N
         The observation; :attr:`Observation.is_empty` when nothing is there.
     """
     c = np.asarray(centre, dtype=np.float64)
-    left, top, depth = _crop(frame, c, radius)
-    camera = frame.camera.crop(left, top, depth.shape[1], depth.shape[0])
-    mask = _foreground(depth, camera, c, radius, plane)
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if rows.size:  # tighten the crop around what was found
-        y0, y1 = max(rows[0] - _MARGIN, 0), min(rows[-1] + _MARGIN + 1, mask.shape[0])
-        x0, x1 = max(columns[0] - _MARGIN, 0), min(columns[-1] + _MARGIN + 1, mask.shape[1])
-        depth, mask = np.ascontiguousarray(depth[y0:y1, x0:x1]), np.ascontiguousarray(mask[y0:y1, x0:x1])
-        left, top = left + int(x0), top + int(y0)
-        camera = frame.camera.crop(left, top, depth.shape[1], depth.shape[0])
-    return _measure(frame, camera, left, top, depth, mask)
+    front = np.array([0.0, 0.0, 0.0, 1.0]) if plane is None else np.asarray(plane, dtype=np.float64)
+    window = _crop(frame, c, radius)
+    mask = np.empty(window.depth.shape, np.uint8)
+    top, bottom, left, right = foreground(
+        window.depth, camera_numbers(_camera_of(frame, window)), c, radius, front, mask
+    )
+    window, mask = _cut(window, mask, top, bottom, left, right)
+    camera = frame.camera
+    pixel_area = (float(c[2]) / camera.fx) ** 2 if camera.model == "pinhole" else 1.0 / camera.fx**2
+    kept = _without_specks(mask, pixel_area)
+    if kept is not mask:
+        rows, columns = np.flatnonzero(kept.any(axis=1)), np.flatnonzero(kept.any(axis=0))
+        bounds = (rows[0], rows[-1], columns[0], columns[-1]) if len(rows) else (0, -1, 0, -1)
+        window, kept = _cut(window, kept, *(int(bound) for bound in bounds))
+    return _measure(frame, window, kept)
 
 
-def _crop(frame: Frame, centre: NDArray[np.float64], radius: float) -> tuple[int, int, NDArray[np.float32]]:
+class _Window(NamedTuple):
+    """Part of an image: its corner, and its depth (H, W)."""
+
+    left: int
+    top: int
+    depth: NDArray[np.float32]
+
+
+def _crop(frame: Frame, centre: NDArray[np.float64], radius: float) -> _Window:
     """Cut the sphere's bounding box out of the image."""
     camera = frame.camera
     nearest = max(centre[2] - radius, 0.1) if camera.model == "pinhole" else 1.0
@@ -94,92 +108,81 @@ def _crop(frame: Frame, centre: NDArray[np.float64], radius: float) -> tuple[int
     x0, x1 = (int(np.clip(x, 0, width)) for x in (u - half_u, u + half_u + 1))
     y0, y1 = (int(np.clip(y, 0, height)) for y in (v - half_v, v + half_v + 1))
     if x1 - x0 < 2 or y1 - y0 < 2:
-        return 0, 0, np.zeros((2, 2), np.float32)
-    return x0, y0, np.ascontiguousarray(frame.depth[y0:y1, x0:x1])
+        return _Window(0, 0, np.zeros((2, 2), np.float32))
+    return _Window(x0, y0, np.ascontiguousarray(frame.depth[y0:y1, x0:x1]))
 
 
-def _foreground(
-    depth: NDArray[np.float32], camera: Camera, centre: NDArray[np.float64], radius: float, plane: ArrayLike | None
-) -> NDArray[np.uint8]:
-    """Mask of the surface within the sphere, off the plane, without specks."""
-    mask = np.empty(depth.shape, np.uint8)
-    depth_in_sphere(depth, camera_numbers(camera), centre, radius, mask)
-    if plane is not None:
-        mask[_near_plane(depth, camera, np.asarray(plane, dtype=np.float64))] = 0
+def _camera_of(frame: Frame, window: _Window) -> Camera:
+    height, width = window.depth.shape
+    return frame.camera.crop(window.left, window.top, width, height)
+
+
+def _cut(window: _Window, mask: Mask, top: int, bottom: int, left: int, right: int) -> tuple[_Window, Mask]:
+    """Tighten a window to some rows and columns, with a margin; to nothing when they are empty."""
+    if top > bottom:
+        return _Window(window.left, window.top, np.zeros((2, 2), np.float32)), np.zeros((2, 2), np.uint8)
+    y, x = max(top - _MARGIN, 0), max(left - _MARGIN, 0)
+    part = slice(y, bottom + _MARGIN + 1), slice(x, right + _MARGIN + 1)
+    return _Window(window.left + x, window.top + y, window.depth[part].copy()), mask[part].copy()
+
+
+def _without_specks(mask: Mask, pixel_area: float) -> Mask:
+    """Drop components that are too small to be part of a hand."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    pixel_area = (float(centre[2]) / camera.fx) ** 2 if camera.model == "pinhole" else 1.0 / camera.fx**2
     keep = stats[:, cv2.CC_STAT_AREA] * pixel_area > _LEAST_COMPONENT
     keep[0] = False
-    return keep.astype(np.uint8)[labels] if count > 1 else mask
+    if keep.sum() == count - 1:
+        return mask
+    return keep.astype(np.uint8)[labels]
 
 
-def _near_plane(depth: NDArray[np.float32], camera: Camera, plane: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Pixels within 1.2 cm of a plane, or behind it."""
-    v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
-    height = camera.back_project(u, v, depth) @ plane[:3] + plane[3]
-    return height < 0.012
-
-
-def _measure(
-    frame: Frame, camera: Camera, left: int, top: int, depth: NDArray[np.float32], mask: NDArray[np.uint8]
-) -> Observation:
-    depth, mask = _fill_holes(depth, mask)
-    height, width = depth.shape
+def _measure(frame: Frame, window: _Window, mask: Mask) -> Observation:
+    """Clean the surface under a mask and measure its points and normals."""
     if not mask.any():
-        return _empty(frame, camera, left, top)
+        return _empty(frame, window)
+    depth, camera = window.depth, _camera_of(frame, window)
+    height, width = depth.shape
+    numbers = camera_numbers(camera)
+    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    fill_holes(depth, mask, closed)
     distance, region = cv2.distanceTransformWithLabels(1 - mask, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
-    pixels = np.flatnonzero(mask).astype(np.int32)
-    place = np.zeros(int(region.max()) + 1, np.int32)
-    place[region.reshape(-1)[pixels]] = pixels
-    nearest = place[region]
+    pixels, nearest = np.empty(height * width, np.int32), np.empty((height, width), np.int32)
+    count = nearest_pixels(mask, region, np.zeros(height * width + 1, np.int32), pixels, nearest)
     filled = depth.reshape(-1)[nearest]
     smooth = np.asarray(cv2.bilateralFilter(filled, 5, 0.008, 2.0), dtype=np.float32)
-    numbers = camera_numbers(camera)
-    points, normals = np.empty((height * width, 3)), np.empty((height * width, 3))
-    surface_points(smooth, numbers, points, normals)
-    labels = mask.copy()
-    labels[(mask == 0) & (depth > 0) & (depth < filled - _OCCLUDER_GAP)] = 2
+    labels = np.where((mask == 0) & (depth > 0) & (depth < filled - _OCCLUDER_GAP), np.uint8(UNKNOWN), mask)
+    surface = np.empty((height * width, SURFACE_COLUMNS), np.float32)
+    surface_points(smooth, numbers, labels, surface)
     grid = _grid(camera, smooth, labels, np.asarray(distance, dtype=np.float32))
-    arrays = ObservationArrays(numbers, points, normals, labels, nearest, pixels, *grid)
-    return Observation(arrays, camera, left, top, np.where(mask, smooth, np.float32(0)), frame.time, frame.index)
-
-
-def _fill_holes(depth: NDArray[np.float32], mask: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Fill pinholes of missing readings from a 3×3 median of what surrounds them."""
-    closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    holes = (closed > 0) & (mask == 0) & (depth <= 0)
-    if not holes.any():
-        return depth, mask
-    median = cv2.medianBlur(np.where(mask, depth, np.float32(0)), 3)
-    holes &= median > 0
-    return np.where(holes, median, depth), np.where(holes, np.uint8(1), mask)
+    arrays = ObservationArrays(numbers, surface, labels, nearest, pixels[:count].copy(), *grid)
+    shown = np.where(mask, smooth, np.float32(0))
+    return Observation(arrays, camera, window.left, window.top, shown, frame.time, frame.index)
 
 
 def _grid(
-    camera: Camera, depth: NDArray[np.float32], labels: NDArray[np.uint8], distance: NDArray[np.float32]
-) -> tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32], int]:
-    """Sample the crop to at most GRID_CELLS cells: camera, depth, labels, cost of covering a cell, number of hand cells."""
+    camera: Camera, depth: NDArray[np.float32], labels: Mask, distance: NDArray[np.float32]
+) -> tuple[NDArray[np.float64], NDArray[np.float32], Mask, NDArray[np.float32], int]:
+    """Sample the crop to about GRID_CELLS cells: camera, depth, labels, cost of covering a cell, number of hand cells."""
     height, width = depth.shape
     pitch = max(1.0, float(np.sqrt(height * width / GRID_CELLS)))
-    rows = np.minimum(np.rint(np.arange(0, height - 0.5, pitch)).astype(np.intp), height - 1)
-    columns = np.minimum(np.rint(np.arange(0, width - 0.5, pitch)).astype(np.intp), width - 1)
-    at = np.ix_(rows, columns)
+    size = int(np.ceil((height - 0.5) / pitch)), int(np.ceil((width - 0.5) / pitch))
     scaled = camera._replace(fx=camera.fx / pitch, fy=camera.fy / pitch, cx=camera.cx / pitch, cy=camera.cy / pitch)
-    metres = distance[at] / np.float32(camera.fx)
-    if camera.model == "pinhole":
-        metres = metres * depth[at]
-    coarse_labels = labels[at]
-    outside = np.where(coarse_labels == 0, np.minimum(metres / np.float32(OUTSIDE_RAMP), 1), 0).astype(np.float32)
-    return camera_numbers(scaled), depth[at], coarse_labels, outside, int((coarse_labels == 1).sum())
+    grid_depth, grid_labels, outside = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty(size, np.float32)
+    count = coarse_grid(
+        depth, labels, distance, camera_numbers(camera), pitch, OUTSIDE_RAMP, grid_depth, grid_labels, outside
+    )
+    return camera_numbers(scaled), grid_depth, grid_labels, outside, int(count)
 
 
-def _empty(frame: Frame, camera: Camera, left: int, top: int) -> Observation:
+def _empty(frame: Frame, window: _Window) -> Observation:
+    camera = _camera_of(frame, window)
     nothing = np.zeros((2, 2), np.float32)
-    points, normals = np.zeros((4, 3)), np.tile([0.0, 0.0, -1.0], (4, 1))
+    surface = np.zeros((4, SURFACE_COLUMNS), np.float32)
+    surface[:, NORMAL + 2] = -1.0
     numbers = camera_numbers(camera)
     labels, nearest = np.zeros((2, 2), np.uint8), np.zeros((2, 2), np.int32)
     none = np.empty(0, np.int32)
     arrays = ObservationArrays(
-        numbers, points, normals, labels, nearest, none, numbers, nothing, labels, np.ones((2, 2), np.float32), 0
+        numbers, surface, labels, nearest, none, numbers, nothing, labels, np.ones((2, 2), np.float32), 0
     )
-    return Observation(arrays, camera, left, top, nothing, frame.time, frame.index)
+    return Observation(arrays, camera, window.left, window.top, nothing, frame.time, frame.index)

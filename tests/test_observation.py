@@ -268,3 +268,23 @@ def test_frame_and_time_are_kept() -> None:
     frame = Frame(17, 0.56, draw_sphere(camera), camera)
     observation = observe(frame, CENTRE, 0.1)
     assert (observation.index, observation.time) == (17, 0.56)
+
+
+def test_the_frame_is_not_changed() -> None:
+    camera = CAMERAS["pinhole"]
+    depth = draw_sphere(camera)
+    depth[depth > 0] += np.float32(0.0)
+    depth[118:121, 164] = 0
+    kept = depth.copy()
+    observe(frame_of(depth, camera), CENTRE, 5.0)  # a window as large as the frame
+    np.testing.assert_array_equal(depth, kept)
+
+
+def test_readings_that_are_no_number_are_no_surface() -> None:
+    camera = CAMERAS["pinhole"]
+    depth = draw_sphere(camera)
+    depth[::7, ::5] = np.nan
+    depth[3::11, 2::13] = np.inf
+    observation = observe(frame_of(depth, camera), CENTRE, 0.1)
+    assert_sound(observation)
+    assert np.abs(np.linalg.norm(observation.hand_points - CENTRE, axis=1)[10:-10] - 0.07).max() < 0.01

@@ -84,7 +84,7 @@ def _without_arm(hand: Hand) -> NDArray[np.int32]:
 
 
 def _beyond_wrist(offsets: Array, axis: Array) -> NDArray[np.bool_]:
-    """Which points, at (M, 3) from the wrist, are forearm; as :func:`spf.kernels.render.beyond_wrist` for one."""
+    """Which points, at (M, 3) from the wrist, are forearm; as :func:`spf.kernels.golden.beyond_wrist` for one."""
     along = offsets @ axis
     across = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))
     return np.asarray((along >= 0.01) & (across < 0.045 + 1.2 * along))

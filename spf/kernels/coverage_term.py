@@ -24,7 +24,7 @@ def coverage_term(
     pose: Array, direction: Array, pixels: NDArray[np.int32], matches: NDArray[np.int32], bones: Array,
 ) -> float:  # fmt: skip
     """Energy of observed pixels and their matches; adds their wrenches. A match of -1 counts nothing."""
-    movers, shares, points = surface.influence_bone, surface.shares, obs.points
+    movers, shares, points = surface.influence_bone, surface.shares, obs.surface
     size = pixels.shape[0] if weights.coverage > 0.0 else 0
     gain = weights.points / max(size, 1) * weights.coverage / (weights.length * weights.length)
     pull = weights.pull

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from spf.kernels.collision_term import place_spheres, touches
 from spf.kernels.compiling import index, kernel, part
-from spf.kernels.cost_inputs import HAND, UNKNOWN, CostWeights, ObservationArrays, Spheres, Workspace
+from spf.kernels.cost_inputs import HAND, LABEL, NORMAL, UNKNOWN, CostWeights, ObservationArrays, Spheres, Workspace
 from spf.kernels.depth_term import pixel_of
 from spf.kernels.kinematics import Skeleton, pose_bones
 from spf.kernels.skinning import MOST_INFLUENCES, Skin, bone_share
@@ -99,8 +99,8 @@ def _of_model_points(
     pose: Array, sample: NDArray[np.int32], work: Workspace, diagonal: Array,
 ) -> None:  # fmt: skip
     """Add the curvature of the depth, normal and background terms."""
-    columns, labels, points, normals = work.columns, obs.labels, obs.points, obs.normals
-    height, width = labels.shape
+    columns, seen = work.columns, obs.surface
+    height, width = obs.nearest.shape
     scale = weights.points / sample.shape[0]
     per_area = scale / (weights.length * weights.length)
     behind, front, pull = weights.behind, weights.front, weights.pull
@@ -108,11 +108,11 @@ def _of_model_points(
         x, y, z, mx, my, mz = _point_columns(skeleton, surface, index(sample[s]), work)
         x, y, z = x + pose[0], y + pose[1], z + pose[2]
         v, u = pixel_of(obs.camera, x, y, z, height, width)
-        label = labels[v, u]
+        p = index(v * width + u)
+        label = seen[p, LABEL]
         if label == HAND:
-            p = index(v * width + u)
-            nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
-            r = nx * (x - points[p, 0]) + ny * (y - points[p, 1]) + nz * (z - points[p, 2])
+            nx, ny, nz = float(seen[p, NORMAL]), float(seen[p, NORMAL + 1]), float(seen[p, NORMAL + 2])
+            r = nx * (x - seen[p, 0]) + ny * (y - seen[p, 1]) + nz * (z - seen[p, 2])
             w = 1.0 / (1.0 + r * r * (front if r > 0.0 else behind))
             w = w if r > 0.0 else w * w
             short = 1.0 / math.sqrt(mx * mx + my * my + mz * mz)
@@ -124,7 +124,7 @@ def _of_model_points(
                 diagonal[d] += per_area * w * rate * rate + stiff * turning
         elif label != UNKNOWN:
             p = index(obs.nearest[v, u])
-            squared = (x - points[p, 0]) ** 2 + (y - points[p, 1]) ** 2 + (z - points[p, 2]) ** 2
+            squared = (x - seen[p, 0]) ** 2 + (y - seen[p, 1]) ** 2 + (z - seen[p, 2]) ** 2
             _add_pull(columns, weights.background * per_area / (1.0 + squared * pull), diagonal)
 
 
@@ -141,7 +141,7 @@ def _of_pixels(
     pixels: NDArray[np.int32], matches: NDArray[np.int32], work: Workspace, diagonal: Array,
 ) -> None:  # fmt: skip
     """Add the curvature of the coverage term."""
-    columns, points = work.columns, obs.points
+    columns, points = work.columns, obs.surface
     gain = weights.points / pixels.shape[0] * weights.coverage / (weights.length * weights.length)
     pull = weights.pull
     for s in range(pixels.shape[0]):

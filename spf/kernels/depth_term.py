@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.kernels.compiling import index, part
-from spf.kernels.cost_inputs import HAND, UNKNOWN, CostWeights, ObservationArrays
+from spf.kernels.cost_inputs import HAND, LABEL, NORMAL, UNKNOWN, CostWeights, ObservationArrays
 from spf.kernels.robust import cauchy_sum, multiply
 from spf.kernels.skinning import Skin, carry, push
 
@@ -40,8 +40,8 @@ def depth_term(
 ) -> float:  # fmt: skip
     """Energy of the sampled model points; adds their wrenches to those of the bones."""
     movers, shares = surface.influence_bone, surface.shares
-    camera, labels, nearest, points, normals = obs.camera, obs.labels, obs.nearest, obs.points, obs.normals
-    height, width = labels.shape
+    camera, seen, nearest = obs.camera, obs.surface, obs.nearest
+    height, width = nearest.shape
     scale = weights.points / max(sample.shape[0], 1)
     per_area, stiffness = scale / (weights.length * weights.length), scale * weights.normal
     behind, front, pull = weights.behind, weights.front, weights.pull
@@ -53,11 +53,11 @@ def depth_term(
         x, y, z, mx, my, mz, dx, dy, dz, ex, ey, ez = carry(movers, shares, bones, i)
         x, y, z, dx, dy, dz = x + tx, y + ty, z + tz, dx + sx, dy + sy, dz + sz
         v, u = pixel_of(camera, x, y, z, height, width)
-        label = labels[v, u]
+        p = index(v * width + u)
+        label = seen[p, LABEL]
         if label == HAND:
-            p = index(v * width + u)
-            nx, ny, nz = normals[p, 0], normals[p, 1], normals[p, 2]
-            r = nx * (x - points[p, 0]) + ny * (y - points[p, 1]) + nz * (z - points[p, 2])
+            nx, ny, nz = float(seen[p, NORMAL]), float(seen[p, NORMAL + 1]), float(seen[p, NORMAL + 2])
+            r = nx * (x - seen[p, 0]) + ny * (y - seen[p, 1]) + nz * (z - seen[p, 2])
             # n points to the camera: r > 0 is in front of the surface
             before, squared = r > 0.0, r * r
             factor = 1.0 + squared * (front if before else behind)
@@ -83,7 +83,7 @@ def depth_term(
             )  # fmt: skip
         elif label != UNKNOWN:
             p = index(nearest[v, u])
-            ax, ay, az = x - points[p, 0], y - points[p, 1], z - points[p, 2]
+            ax, ay, az = x - seen[p, 0], y - seen[p, 1], z - seen[p, 2]
             squared = ax * ax + ay * ay + az * az
             factor = 1.0 + squared * pull
             pulls += squared

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.kernels.compiling import allocating, index, kernel, part
-from spf.kernels.cost_inputs import ObservationArrays
+from spf.kernels.cost_inputs import NORMAL, ObservationArrays
 from spf.kernels.golden import beyond_wrist
 from spf.kernels.kinematics import Chain, Skeleton, pose_bones
 from spf.kernels.render import FAR, project_skin, rasterise
@@ -23,8 +23,8 @@ Image = NDArray[np.float32]
 _GRAZING = -0.05  # cosine to the line of sight under which a vertex faces the camera
 _BEHIND = 0.006  # m by which a vertex may lie behind the z-buffer, which is drawn coarsely from a coarse mesh
 _DISTANCE_BITS, _COLUMN_BITS = 18, 12  # together 31: an int32 but for its sign
-_DISAGREEMENT = 0.0002  # m² by which opposite normals set a pixel and a vertex apart, times two
 _FOREARM_BEGINS = 0.01  # m past the wrist's plane: nearer pixels may still be matched with the hand
+_DISAGREEMENT = 0.0002  # m² by which opposite normals set a pixel and a vertex apart, times two
 
 
 class Sight(NamedTuple):
@@ -126,19 +126,18 @@ def match_pixels(
     The forearm is what lies beyond the wrist's plane in a wide cone around the palm's axis. Normals that disagree make
     a vertex farther. Distances are compared in single precision.
     """
-    near, bones, points, normals = sight.near, chain.bones, obs.points, obs.normals
+    near, bones, surface = sight.near, chain.bones, obs.surface
     wx, wy, wz = bones[0, 3] + pose[0], bones[0, 7] + pose[1], bones[0, 11] + pose[2]
     ax, ay, az = bones[0, 2], bones[0, 6], bones[0, 10]  # +z of the palm's frame points to the forearm
     for s in range(pixels.shape[0]):
         p = index(pixels[s])
-        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        x, y, z = surface[p, 0], surface[p, 1], surface[p, 2]
         if beyond_wrist(x - wx, y - wy, z - wz, ax, ay, az, _FOREARM_BEGINS):
             matches[s] = -1
             continue
         c = _nearest(
             near, count, np.float32(radius * radius),
-            np.float32(x), np.float32(y), np.float32(z),
-            np.float32(normals[p, 0]), np.float32(normals[p, 1]), np.float32(normals[p, 2]),
+            x, y, z, surface[p, NORMAL], surface[p, NORMAL + 1], surface[p, NORMAL + 2],
         )  # fmt: skip
         matches[s] = sight.visible[c] if c >= 0 else -1
 

@@ -11,6 +11,7 @@ from spf.cost.problem import Problem
 from spf.cost.products import Sample, curvature, products, see
 from spf.errors import HandError
 from spf.hand.model import load_hand
+from spf.kernels.cost_inputs import LABEL, UNKNOWN
 from tests.reference import cost as reference
 from tests.scenes import CAMERAS, hand_problem, natural_pose
 
@@ -176,7 +177,9 @@ def test_unknown_pixels_count_nothing() -> None:
     """A surface far in front hides the hand: what lies behind it says nothing."""
     case = only(make_case("right", 26, "pinhole", "away"), normal=1.0, background=1.0)
     observation = case.problem.observation
-    hidden = observation.arrays._replace(labels=np.full_like(observation.arrays.labels, 2))
+    surface = observation.arrays.surface.copy()
+    surface[:, LABEL] = UNKNOWN
+    hidden = observation.arrays._replace(surface=surface)
     problem = case.problem._replace(observation=observation._replace(arrays=hidden))
     assert products(problem, case.pose, case.pose, case.sample).energy == 0
 

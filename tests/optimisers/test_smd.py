@@ -138,17 +138,18 @@ def test_a_start_beside_the_truth_comes_back(side: str, dofs: int, camera: str) 
     hand = load_hand(side, free_dip=dofs == 30)
     truth = natural_pose(hand, (0.1, 0.2, -0.1))
     problem = hand_problem(hand, truth, CAMERAS[camera])
-    settings, errors = SmdSettings(rounds=30, initial_step=0.2), []
+    settings, errors = SmdSettings(rounds=40, decay=0.5, initial_step=0.3, most_step=3.0), []
     for seed in range(5):
         start = hand.constrain(beside(truth, np.random.default_rng(seed)))
         assert vertex_error(problem, start, truth) > 0.008
         found, _, iterations = optimise(problem, settings, np.random.default_rng(seed), start)
-        assert iterations == 300
+        assert iterations == 400
         assert costs(problem, found[None])[0] < costs(problem, start[None])[0]
         assert (found >= hand.limits[:, 0]).all()
         assert (found <= hand.limits[:, 1]).all()
         errors.append(vertex_error(problem, found, truth))
-    assert np.median(errors) < 0.002  # a start in another valley is what the filter's particles are for
+    # free fingertips turn by a few degrees at 1 mm a pixel; another valley is what the filter's particles are for
+    assert np.median(errors) < (0.002 if dofs == 26 else 0.004)
 
 
 @pytest.fixture(scope="module")
