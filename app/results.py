@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Frame
-from spf.optimisers.smd import SmdTrace
+from spf.optimisers.trajectory import Trajectory
 from spf.settings import Settings
 from spf.track import TrackedFrame, Tracking, TrackState
 
@@ -131,10 +131,10 @@ def thinned(result: TrackedFrame) -> TrackedFrame:
     return result._replace(info=result.info._replace(trajectories=traces))
 
 
-def _thin(trace: SmdTrace) -> SmdTrace:
+def _thin(trace: Trajectory) -> Trajectory:
     count = len(trace.poses)
     kept = np.unique(np.linspace(0, count - 1, min(count, PATH_POSES)).round().astype(np.intp))
-    return SmdTrace(*(part[kept] for part in trace))
+    return Trajectory(*(part[kept] for part in trace))
 
 
 def same_rules(tracking: Tracking, tracker: str, settings: Settings) -> bool:

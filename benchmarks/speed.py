@@ -21,6 +21,7 @@ import numpy as np
 from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.filters import smart
+from spf.filters.step import start_at
 from spf.initialise import reach_of
 from spf.observation import observe
 from spf.optimisers.smd import optimise
@@ -57,7 +58,7 @@ def _frame(session: SyntheticSession, settings: smart.SpfSettings, frames: int) 
     assert first.truth is not None
     assert first.truth.pose is not None
     assert first.truth.orientation is not None
-    state = smart.start(session.hand, first.truth.pose, first.truth.orientation, -1 / 30, settings.n)
+    state = start_at(session.hand, first.truth.pose, first.truth.orientation, -1 / 30, settings.n)
     spheres = digit_spheres(session.hand)
     totals, stages = [], []
     for frame in [session[index] for index in range(frames)]:

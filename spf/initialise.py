@@ -18,6 +18,7 @@ from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.errors import StartError
 from spf.filters import smart
+from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Hand, Side, load_hand
@@ -318,12 +319,12 @@ def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:
 
 def _track(
     hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator, reference: Array | None = None
-) -> list[tuple[Observation, smart.State, smart.StepInfo]]:
+) -> list[tuple[Observation, State, StepInfo]]:
     """Track a hypothesis with the default filter, until nothing is seen any more."""
     hand, settings = hypothesis.shape.hand(), smart.SpfSettings()
     spheres = digit_spheres(hand)
     axes = np.eye(3) if reference is None else reference
-    state = smart.start(hand, hypothesis.pose, axes, frames[0].time - 1 / 30, settings.n)
+    state = start_at(hand, hypothesis.pose, axes, frames[0].time - 1 / 30, settings.n)
     result = []
     for frame in frames:
         observation = observe(frame, state.estimate[:3], reach_of(hand))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.cost.spheres import digit_spheres
-from spf.filters import smart
+from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of
 from spf.hand.model import Hand
@@ -67,7 +67,7 @@ class TrackState(NamedTuple):
         missing: frames since the hand was lost.
     """
 
-    filter: smart.State
+    filter: State
     lost: bool
     history: tuple[float, ...]
     bad: int
@@ -108,7 +108,7 @@ class TrackedFrame(NamedTuple):
     overlap: float
     seconds: float
     timings: dict[str, float]
-    info: smart.StepInfo | None
+    info: StepInfo | None
     observation: Observation | None
 
 
@@ -123,7 +123,7 @@ def begin(
 
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
-    state = smart.start(tracking.hand, pose, reference, time_, count)
+    state = start_at(tracking.hand, pose, reference, time_, count)
     return TrackState(state, False, (), 0, True, 1.0, 0)
 
 
@@ -189,7 +189,7 @@ def _believable(state: TrackState, tracking: Tracking) -> float:
     return max(1.3 * _usual(state, tracking) + 0.06, 0.3)
 
 
-def _judged(tracking: Tracking, state: TrackState, filter_state: smart.State, info: smart.StepInfo) -> TrackState:
+def _judged(tracking: Tracking, state: TrackState, filter_state: State, info: StepInfo) -> TrackState:
     """Notice a loss, frames in a row that the estimate's render explains much worse than usual, and its end."""
     golden = info.estimate_golden
     bad = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3

@@ -9,6 +9,7 @@ import numpy as np
 
 from spf.errors import SettingError
 from spf.filters import single, smart
+from spf.filters.step import State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 from spf.observation import Observation
@@ -23,7 +24,7 @@ class Step(Protocol):
     def __call__(
         self,
         rng: np.random.Generator,
-        state: smart.State,
+        state: State,
         observation: Observation,
         hand: Hand,
         settings: Any,
@@ -31,7 +32,7 @@ class Step(Protocol):
         spheres: Spheres | None = None,
         record: bool = False,
         effort: float = 1.0,
-    ) -> tuple[smart.State, smart.StepInfo]:
+    ) -> tuple[State, StepInfo]:
         """Track one frame; see :func:`spf.filters.smart.step`."""
         ...
 

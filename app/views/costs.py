@@ -33,6 +33,8 @@ class Costs(Plot):
         info = self.state.entry.result.info if self.state.entry is not None else None
         before = np.empty(0) if info is None else info.cost_before
         after = np.empty(0) if info is None else info.cost_after
+        if not len(after):  # a filter that optimises nothing
+            after = before
         self.source.data = {"particle": np.arange(1, len(before) + 1), "before": before, "after": after}
         if len(before):
             self.figure.y_range.update(start=0, end=1.1 * float(max(before.max(), after.max())))

@@ -41,12 +41,18 @@ def scenes_of(entry: Entry) -> dict[str, Scene]:
 def _particles(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
     info = entry.result.info
     assert info is not None
-    before, after = np.split(np.exp(info.log_weights), 2)
-    drawn = np.argsort(-np.maximum(before, after), kind="stable")[:_MOST_HANDS]
+    before, after = info.predicted_weights, info.optimised_weights
+    heaviest = np.maximum(before, after) if len(after) else before
+    drawn = np.argsort(-heaviest, kind="stable")[:_MOST_HANDS]
 
     def vertices(poses: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([pose_hand(hand, pose, info.reference).vertices for pose in poses[drawn]])
 
+    if not len(after):  # a filter that optimises nothing
+        return particles_scene(
+            vertices(info.predicted), None, hand.faces,
+            predicted_weights=before[drawn], points=points, at_most=_MOST_HANDS,
+        )  # fmt: skip
     return particles_scene(
         vertices(info.predicted), vertices(info.optimised), hand.faces,
         predicted_weights=before[drawn], optimised_weights=after[drawn], points=points, at_most=_MOST_HANDS,
@@ -56,10 +62,10 @@ def _particles(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
 def _trajectories(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
     info = entry.result.info
     assert info is not None
-    after = np.exp(info.log_weights[len(info.predicted) :])
+    after = info.optimised_weights
     drawn = np.argsort(-after, kind="stable")[:_MOST_PATHS]
     traces = [info.trajectories[index] for index in drawn]
-    longest = max(len(trace.poses) for trace in traces)
+    longest = max((len(trace.poses) for trace in traces), default=1)
     paths = np.empty((len(traces), longest, len(_PATH_JOINTS), 3))
     for path, trace in zip(paths, traces, strict=True):
         for i in range(longest):  # a particle that converged early stays where it is

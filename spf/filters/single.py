@@ -9,6 +9,7 @@ import numpy as np
 from spf.cost.settings import CostSettings
 from spf.cost.spheres import digit_spheres
 from spf.filters import smart
+from spf.filters.step import State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 from spf.observation import Observation
@@ -24,7 +25,7 @@ class SingleSettings(SmdSettings, CostSettings):
 
 def step(
     rng: np.random.Generator,
-    state: smart.State,
+    state: State,
     observation: Observation,
     hand: Hand,
     settings: SingleSettings,
@@ -32,7 +33,7 @@ def step(
     spheres: Spheres | None = None,
     record: bool = False,
     effort: float = 1.0,
-) -> tuple[smart.State, smart.StepInfo]:
+) -> tuple[State, StepInfo]:
     """Track one frame: the Smart Particle Filter's step with one particle, no noise and nothing but its optimum kept."""
     alone = smart.SpfSettings(
         **settings.to_dict(), n=1, noise_translation=1e-5, noise_rotation=1e-4, noise_digits=1e-4, velocity=0.0,

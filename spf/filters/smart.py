@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-import time
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +15,16 @@ from spf.filters.kde import log_correction, paper_window, silverman_window
 from spf.filters.particles import ParticleSet, ess, normalise, weighted_mean
 from spf.filters.proposals import ProposalSettings, propose
 from spf.filters.resampling import systematic
-from spf.hand.kinematics import angles_of, rotation_about
+from spf.filters.step import Clock, State, StepInfo, recentred
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 from spf.observation import Observation
-from spf.optimisers.smd import SmdSettings, SmdTrace, optimise
+from spf.optimisers.smd import SmdSettings, optimise
+from spf.optimisers.trajectory import Trajectory
 from spf.parallel import map_threads
 from spf.settings import setting
 
-__all__ = ["SpfSettings", "State", "StepInfo", "start", "step"]
+__all__ = ["SpfSettings", "step"]
 
 Array = NDArray[np.float64]
 _FILTER = "Filter"
@@ -62,81 +60,6 @@ class SpfSettings(ProposalSettings, DynamicsSettings, SmdSettings, CostSettings)
     )
 
 
-class State(NamedTuple):
-    """What the filter carries from frame to frame.
-
-    Attributes:
-        particles: the weighted set, relative to ``reference``.
-        reference: (3, 3) R_ref.
-        estimate: (D,) pose, relative to ``reference``.
-        time: s, of the frame.
-    """
-
-    particles: ParticleSet
-    reference: Array
-    estimate: Array
-    time: float
-
-
-class StepInfo(NamedTuple):
-    """Everything that happened in a frame: all that a view may read besides the state.
-
-    N particles give N predicted and N optimised samples; the samples' arrays hold the predicted ones first.
-
-    Attributes:
-        reference: (3, 3) R_ref of all poses here.
-        ancestors: (N,) which sample of the last frame each particle came from.
-        origins: (N,) proposal that each particle was predicted by.
-        predicted, optimised: (N, D).
-        cost_before, cost_after: (N,) E of the predicted and of the optimised samples.
-        golden: (2N,) rendered comparison.
-        overlap: (2N,) silhouette overlap.
-        log_likelihood: (2N,).
-        log_correction: (2N,) log c (32); zeros when switched off.
-        log_weights: (2N,) normalised.
-        ess: effective sample size of the 2N samples.
-        optimised_share: weight of the optimised half.
-        window: h that was used.
-        estimate: (D,) pose, relative to ``reference``.
-        estimate_golden, estimate_overlap, estimate_cost, estimate_log_likelihood: of the estimate.
-        trajectories: N trajectories of SMD, or () when not recorded.
-        evaluations: cost evaluations in the frame.
-        timings: seconds by stage.
-    """
-
-    reference: Array
-    ancestors: NDArray[np.intp]
-    origins: tuple[str, ...]
-    predicted: Array
-    optimised: Array
-    cost_before: Array
-    cost_after: Array
-    golden: Array
-    overlap: Array
-    log_likelihood: Array
-    log_correction: Array
-    log_weights: Array
-    ess: float
-    optimised_share: float
-    window: float
-    estimate: Array
-    estimate_golden: float
-    estimate_overlap: float
-    estimate_cost: float
-    estimate_log_likelihood: float
-    trajectories: tuple[SmdTrace, ...]
-    evaluations: int
-    timings: dict[str, float]
-
-
-def start(hand: Hand, pose: Array, reference: Array, time_: float, count: int) -> State:
-    """Begin with ``count`` particles at one pose (D,) relative to ``reference``, at rest."""
-    poses = np.repeat(np.asarray(pose, dtype=np.float64)[None], count, axis=0)
-    uniform = np.full(count, -math.log(count))
-    particles = ParticleSet(hand.constrain(poses), np.zeros_like(poses), uniform)
-    return _recentred(State(particles, np.asarray(reference, dtype=np.float64), particles.poses[0], time_))
-
-
 def step(
     rng: np.random.Generator,
     state: State,
@@ -163,7 +86,7 @@ def step(
     Returns:
         (state, info).
     """
-    clock = _Clock()
+    clock = Clock()
     interval = max(observation.time - state.time, 1e-3)
     problem = make_problem(hand, observation, settings, state.reference, rng, spheres)
     ancestors = systematic(state.particles.log_weights, settings.n, rng)  # (a) resample
@@ -196,7 +119,7 @@ def step(
         estimate_log_likelihood, trajectories,
         iterations + screened + len(samples) + 1, clock.seconds,
     )  # fmt: skip
-    return _recentred(new), info
+    return recentred(new), info
 
 
 def _optimise(
@@ -207,14 +130,14 @@ def _optimise(
     rng: np.random.Generator,
     record: bool,
     effort: float,
-) -> tuple[Array, tuple[SmdTrace, ...], int]:
+) -> tuple[Array, tuple[Trajectory, ...], int]:
     """Run SMD from every predicted sample, independently and in parallel."""
     noise = noise_scale(problem.hand, settings, interval)
     precision = settings.points * settings.prediction_pull / noise**2
     precision[:6] = 0.0  # the palm is free: only digits that nothing is seen of are held
     streams = rng.spawn(len(predicted))
 
-    def run(index: int) -> tuple[Array, SmdTrace | None, int]:
+    def run(index: int) -> tuple[Array, Trajectory | None, int]:
         pose = predicted[index]
         return optimise(
             problem, settings, streams[index], pose, prior=pose, precision=precision, effort=effort, record=record
@@ -257,30 +180,3 @@ def _judge(problem: Problem, poses: Array) -> tuple[Array, Array, Array]:
     parts = map_threads(run, [chunk for chunk in np.array_split(poses, 2) if len(chunk)])
     energy, golden_energy, overlap = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return energy, golden_energy, overlap
-
-
-def _recentred(state: State) -> State:
-    """Turn R_ref to the estimate, so that the palm's angles stay small and their differences meaningful (spec 1)."""
-    turn = rotation_about(state.estimate[3:6])
-    reference = turn @ state.reference
-    u, _, vt = np.linalg.svd(reference)
-    reference = u @ vt
-    poses, velocities = state.particles.poses.copy(), state.particles.velocities
-    for pose in poses:
-        pose[3:6] = angles_of(rotation_about(pose[3:6]) @ turn.T)
-    estimate = state.estimate.copy()
-    estimate[3:6] = 0.0
-    return State(ParticleSet(poses, velocities, state.particles.log_weights), reference, estimate, state.time)
-
-
-class _Clock:
-    """Seconds by stage."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def __call__(self, stage: str) -> None:
-        now = time.perf_counter()
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
-        self._last = now

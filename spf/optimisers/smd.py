@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spf.cost.problem import Problem, scratch_of
 from spf.kernels.smd import SmdParameters, smd_run
+from spf.optimisers.trajectory import Trajectory
 from spf.settings import Settings, setting
 
-__all__ = ["SmdSettings", "SmdTrace", "optimise"]
+__all__ = ["SmdSettings", "optimise"]
 
 Array = NDArray[np.float64]
 _SMD = "Stochastic meta-descent"
@@ -44,20 +44,6 @@ class SmdSettings(Settings):
     )
 
 
-class SmdTrace(NamedTuple):
-    """The trajectory of a run of I iterations.
-
-    Attributes:
-        poses: (I + 1, D).
-        costs: (I + 1,) E on the sample of each iteration; the last one repeats.
-        step_sizes: (I + 1, D) a.
-    """
-
-    poses: Array
-    costs: Array
-    step_sizes: Array
-
-
 def optimise(
     problem: Problem,
     settings: SmdSettings,
@@ -68,7 +54,7 @@ def optimise(
     precision: Array | None = None,
     effort: float = 1.0,
     record: bool = False,
-) -> tuple[Array, SmdTrace | None, int]:
+) -> tuple[Array, Trajectory | None, int]:
     """Minimise the cost from a pose with SMD.
 
     Args:
@@ -93,7 +79,7 @@ def optimise(
         dtype=np.uint32,
     )
     size = len(draws) + 1 if record else 0
-    trace = SmdTrace(np.empty((size, dofs)), np.empty(size), np.empty((size, dofs)))
+    trace = Trajectory(np.empty((size, dofs)), np.empty(size), np.empty((size, dofs)))
     result = np.empty(dofs)
     hand = problem.hand
     done = smd_run(
@@ -104,7 +90,7 @@ def optimise(
         step_bounds(dofs), problem.curvature_floor, draws, pool,
         scratch_of(problem, parameters.points, parameters.data_points), result, *trace,
     )  # fmt: skip
-    cut = SmdTrace(*(part[: done + 1] for part in trace)) if record else None
+    cut = Trajectory(*(part[: done + 1] for part in trace)) if record else None
     return result, cut, int(done)
 
 

@@ -28,7 +28,7 @@ RESIDUAL_FULL = 0.010
 
 def particles_scene(
     predicted: ArrayLike | None,
-    optimised: ArrayLike,
+    optimised: ArrayLike | None,
     faces: ArrayLike,
     *,
     predicted_weights: ArrayLike | None = None,
@@ -40,7 +40,7 @@ def particles_scene(
 
     Args:
         predicted: (N, V, 3) vertices of the predicted hands in metres, or None where the tracker has none.
-        optimised: (N, V, 3) vertices of the optimised hands, particle for particle.
+        optimised: (N, V, 3) vertices of the optimised hands, particle for particle, or None where the tracker has none.
         faces: (F, 3) vertex indices, counter-clockwise seen from outside.
         predicted_weights, optimised_weights: (N,) weights of the two halves, on one scale; None draws all alike.
         points: (M, 3) observed points, or None.
@@ -49,14 +49,16 @@ def particles_scene(
     Raises:
         ValueError: shapes do not fit together, or a weight is negative or not finite.
     """
-    after = np.asarray(optimised, dtype=np.float32)
-    before = np.zeros((0, *after.shape[1:]), np.float32) if predicted is None else np.asarray(predicted, np.float32)
-    if len(before) not in (0, len(after)):
+    nothing = np.zeros((0, 0, 3), np.float32)
+    after = nothing if optimised is None else np.asarray(optimised, dtype=np.float32)
+    before = nothing if predicted is None else np.asarray(predicted, np.float32)
+    if len(before) and len(after) and len(before) != len(after):
         raise ValueError(f"there are {len(before)} predicted and {len(after)} optimised hands")
     weights_before = _weights(predicted_weights, len(before))
     weights_after = _weights(optimised_weights, len(after))
     heaviest = max(weights_before.max(initial=0.0), weights_after.max(initial=0.0)) or 1.0
-    rank = weights_after if not len(before) else np.maximum(weights_before, weights_after)
+    halves = [weights for weights in (weights_before, weights_after) if len(weights)]
+    rank = np.max(halves, axis=0) if halves else np.empty(0)
     drawn = np.sort(np.argsort(-rank, kind="stable")[:at_most])
     indices = np.asarray(faces, dtype=np.int32)
     low, high = OPACITY_RANGE
@@ -73,7 +75,7 @@ def trajectories_scene(paths: ArrayLike, *, weights: ArrayLike | None = None, po
     """Show how Stochastic Meta-Descent moved some joints of every particle, from a start dot to an end dot (Fig. 10).
 
     Args:
-        paths: (N, I, J, 3) of N particles, I ≥ 1 iterations and J joints (the wrist and the five fingertips), metres; a
+        paths: (N, I, J, 3) of N ≥ 0 particles, I ≥ 1 iterations and J joints (the wrist and the five fingertips), metres; a
             particle that converged early repeats its last position.
         weights: (N,) weights after optimisation: lighter particles fade into the background; None draws all alike.
         points: (M, 3) observed points, or None.
@@ -85,6 +87,8 @@ def trajectories_scene(paths: ArrayLike, *, weights: ArrayLike | None = None, po
     if steps.ndim != 4 or steps.shape[1] < 1 or steps.shape[3] != 3:
         raise ValueError(f"paths have shape {steps.shape}, expected (N, I, J, 3) with at least one iteration")
     particles, iterations, joints, _ = steps.shape
+    if not particles:  # a tracker that optimises nothing
+        return Scene(points=_backdrop(points))
     given = _weights(weights, particles)
     strength = 0.35 + 0.65 * np.repeat(given / (given.max(initial=0.0) or 1.0), joints)[:, None, None]
     along = gradient(PREDICTED, OPTIMISED, np.linspace(0.0, 1.0, iterations))

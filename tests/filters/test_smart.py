@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from spf.filters import smart
+from spf.filters.step import start_at
 from spf.frame import Frame
 from spf.hand import HandShape
 from spf.hand.kinematics import joints_of
@@ -26,7 +27,7 @@ def session():  # type: ignore[no-untyped-def]
 def _first(session):  # type: ignore[no-untyped-def]
     frame: Frame = session[0]
     hand = session.hand
-    state = smart.start(hand, frame.truth.pose, frame.truth.orientation, frame.time - 1 / 30, _SETTINGS.n)
+    state = start_at(hand, frame.truth.pose, frame.truth.orientation, frame.time - 1 / 30, _SETTINGS.n)
     return hand, state, observe(frame, state.estimate[:3], reach_of(hand))
 
 
@@ -84,7 +85,7 @@ def test_every_tracker_and_preset_tracks_a_few_frames(tracker: str, preset: str,
     truth = session[0].truth
     settings = make_settings(tracker, preset)
     hand, state, observation = _first(session)
-    state = smart.start(hand, truth.pose, truth.orientation, -1 / 30, getattr(settings, "n", 1))
+    state = start_at(hand, truth.pose, truth.orientation, -1 / 30, getattr(settings, "n", 1))
     _, info = TRACKERS[tracker].step(np.random.default_rng(0), state, observation, hand, settings)
     error = np.linalg.norm(joints_of(hand, info.estimate, info.reference) - truth.joints, axis=1).mean()
     assert error < (0.03 if preset == "paper" else 0.012)

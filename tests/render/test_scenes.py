@@ -54,6 +54,15 @@ def test_a_tracker_without_predictions_and_weights_that_are_all_zero():
     assert scene.points == ()
 
 
+def test_a_tracker_that_optimises_nothing():
+    scene = particles_scene(hands(3), None, BALL.faces, predicted_weights=[0.1, 0.7, 0.2], at_most=2)
+    assert [mesh.colour.tolist() for mesh in scene.meshes] == [as_bytes(PREDICTED).tolist()] * 2
+    assert_allclose(scene.meshes[0].vertices, hands(3)[1], atol=1e-6)
+    paths = trajectories_scene(np.empty((0, 1, 6, 3)), weights=[], points=POINTS)
+    assert paths.lines == ()
+    assert len(paths.points) == 1
+
+
 @pytest.mark.parametrize("weights", [[1.0], [1.0, -1.0], [1.0, np.nan]])
 def test_weights_that_do_not_fit_are_refused(weights):
     with pytest.raises(ValueError, match="weights"):
