@@ -22,7 +22,7 @@ from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.filters import smart
 from spf.filters.step import start_at
-from spf.initialise import reach_of
+from spf.locate import reach_of
 from spf.observation import observe
 from spf.optimisers.smd import optimise
 from spf.parallel import threads

@@ -14,22 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.calibrate import View, fit_shape, size_by_render
-from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.errors import StartError
 from spf.filters import smart
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
-from spf.hand.model import Hand, Side, load_hand
+from spf.hand.model import Side, load_hand
 from spf.hand.shape import HandShape
+from spf.locate import locate, reach_of
 from spf.observation import Observation, observe
-from spf.optimisers.smd import optimise
-from spf.parallel import map_threads
-from spf.search import Hypotheses, SearchSettings, refine, search, size_penalty
+from spf.search import SearchSettings, size_penalty
 from spf.segmentation import find_regions
 
-__all__ = ["Start", "find_start", "locate", "reach_of", "recover"]
+__all__ = ["Start", "find_start"]
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -98,11 +96,6 @@ class _Followed(NamedTuple):
     reference: Array
     energy: float
     margin: float
-
-
-def reach_of(hand: Hand) -> float:
-    """Radius (m) around the palm's centre that holds the hand and some of the arm."""
-    return 0.85 * hand.length + 0.02
 
 
 def find_start(
@@ -227,81 +220,6 @@ def _hypotheses(
         result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
     least = min((h.energy for h in result), default=0.0)
     return [h for h in result if h.energy < 1.5 * least + 0.05]
-
-
-def locate(
-    hand: Hand, observation: Observation, places: Array, settings: SearchSettings, rng: np.random.Generator
-) -> list[tuple[float, Array, float]]:
-    """Search one observation: [(scale, pose (D,) relative to the camera's axes, golden energy)], best first.
-
-    A global search by rendering, its best polished by SMD at the size that the search gave each, a finer search from
-    those, and SMD again.
-    """
-    cost = smart.SpfSettings()
-    problem = make_problem(hand, observation, cost, np.eye(3), rng)
-    found = search(problem, places, settings, rng)
-    for _ in range(2):
-        distinct = _spaced(hand, found, _POLISHED)
-        polished = _polish(problem, cost, found.poses[distinct], found.scales[distinct], rng)
-        poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
-        found = refine(problem, poses, scales, settings, rng)
-    return sorted(polished, key=lambda item: item[2])
-
-
-def _spaced(hand: Hand, found: Hypotheses, most: int) -> list[int]:
-    """Indices of the best hypotheses that differ from each other."""
-    kept: list[int] = []
-    joints: list[Array] = []
-    for index, pose in enumerate(found.poses):
-        own = joints_of(hand, pose)
-        if all(np.linalg.norm(own - other, axis=1).mean() > _APART / 2 for other in joints):
-            kept.append(index)
-            joints.append(own)
-        if len(kept) == most:
-            break
-    return kept
-
-
-def _polish(
-    problem: Problem, cost: smart.SpfSettings, poses: Array, scales: Array, rng: np.random.Generator
-) -> list[tuple[float, Array, float]]:
-    """SMD from each pose at its own scale; (scale, pose, golden energy), never worse than before."""
-
-    def run(item: tuple[Array, float, np.random.Generator]) -> tuple[float, Array, float]:
-        rough, scale, seed = item
-        sized = make_problem(problem.hand.scaled(scale), problem.observation, cost, np.eye(3), seed)
-        pose, _, _ = optimise(sized, cost, seed, rough)
-        before, after = golden(sized, np.stack([rough, pose]))[0]
-        return (scale, pose, float(after)) if after < before else (scale, rough, float(before))
-
-    return map_threads(run, list(zip(poses, scales, rng.spawn(len(poses)), strict=True)))
-
-
-def recover(
-    frame: Frame, hand: Hand, limit: float, near: Array, within: float, rng: np.random.Generator
-) -> Array | None:
-    """Look for a lost hand of known shape in a frame.
-
-    Args:
-        frame: the depth image.
-        hand: the calibrated hand.
-        limit: golden energy under which a pose is believed.
-        near: (3,) m, where the palm was last.
-        within: m that it can have moved since.
-        rng: randomness.
-
-    Returns:
-        Its pose (D,) relative to the camera's axes, or None when nothing explains the depth well enough.
-    """
-    settings = SearchSettings(islands=10, kept=4, generations=25, scale_spread=0.0)
-    for region in find_regions(frame)[:2]:
-        observation = observe(frame, region.centre, region.radius)
-        if observation.is_empty:
-            continue
-        for _, pose, energy in locate(hand, observation, region.points, settings, rng):
-            if energy < limit and np.linalg.norm(pose[:3] - near) < within:
-                return pose
-    return None
 
 
 def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:

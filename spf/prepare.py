@@ -20,7 +20,8 @@ from spf.hand.kinematics import joints_of
 from spf.hand.model import Hand, Side, load_hand
 from spf.hand.pose_file import read_pose
 from spf.hand.shape import HandShape
-from spf.initialise import Progress, Start, find_start, reach_of
+from spf.initialise import Progress, Start, find_start
+from spf.locate import reach_of
 from spf.observation import observe
 from spf.sessions import Session
 

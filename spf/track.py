@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 from spf.cost.spheres import digit_spheres
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
-from spf.hand.kinematics import joints_of
+from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Hand
-from spf.initialise import Start, reach_of, recover
+from spf.initialise import Start
 from spf.kernels.cost import Spheres
+from spf.locate import reach_of
 from spf.observation import Observation, observe
+from spf.recover import recover
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
@@ -172,7 +174,9 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     """Search for a lost hand; the state goes on from where it was when nothing better is found."""
     limit = min(_believable(state, tracking), 0.8 * state.golden)
     within = _NEAR + _STRIDE * state.missing
-    found = recover(frame, tracking.hand, limit, state.filter.estimate[:3], within, rng)
+    last = state.filter.estimate.copy()
+    last[3:6] = angles_of(rotation_about(last[3:6]) @ state.filter.reference)
+    found = recover(frame, tracking.hand, limit, last, within, state.missing, rng)
     if found is None:
         return state
     fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)

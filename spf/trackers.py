@@ -76,6 +76,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "zbuffer": False,
         "golden": 0.0,
         "structured": 0.0,
+        "recombination": 0.0,
         "prediction_pull": 0.0,
         "velocity": 1.0,
     },

@@ -23,7 +23,7 @@ class CostSettings(Settings):
     points: int = setting(45, "model points in a sample", group=_COST, low=5, high=1000, symbol="|S|")
     data_points: int = setting(30, "observed pixels in a sample, matched to the model", group=_COST, low=0, high=1000)
     coverage: float = setting(
-        3.0, "weight of observed pixels to the model; 0 is the paper's cost", group=_COST, low=0.0, high=30.0
+        1.0, "weight of observed pixels to the model; 0 is the paper's cost", group=_COST, low=0.0, high=30.0
     )
     background: float = setting(
         0.2, "pull of points beside the hand to the nearest hand pixel", group=_COST, low=0.0, high=10.0

@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 from spf.frame import Frame
 from spf.hand.kinematics import PosedHand, pose_hand
 from spf.hand.model import Hand
-from spf.initialise import reach_of
 from spf.kernels.golden import compare_depth
 from spf.kernels.render import project_vertices, rasterise
+from spf.locate import reach_of
 from spf.observation import Observation, camera_numbers, observe
 
 __all__ = ["Agreement", "agreement_with_depth", "surface_distances"]

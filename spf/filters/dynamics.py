@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spf.hand.model import Hand
 from spf.settings import Settings, setting
 
-__all__ = ["DynamicsSettings", "noise_scale", "predict"]
+__all__ = ["DynamicsSettings", "drift", "noise_scale", "predict"]
 
 Array = NDArray[np.float64]
 _DYNAMICS = "Dynamics"
@@ -47,9 +47,13 @@ def noise_scale(hand: Hand, settings: DynamicsSettings, interval: float = _FRAME
     return np.asarray(scale * np.sqrt(max(interval, 1e-3) / _FRAME))
 
 
+def drift(hand: Hand, poses: Array, velocities: Array, interval: float, settings: DynamicsSettings) -> Array:
+    """Move poses (N, D) by their velocity alone, within the joint limits: the mean of the prediction."""
+    return hand.constrain(poses + settings.velocity * velocities * interval)
+
+
 def predict(
-    hand: Hand, poses: Array, velocities: Array, interval: float, settings: DynamicsSettings, rng: np.random.Generator
+    hand: Hand, expected: Array, interval: float, settings: DynamicsSettings, rng: np.random.Generator
 ) -> Array:
-    """Move particles (N, D) by their velocity and by noise, within the joint limits."""
-    noise = rng.normal(size=poses.shape) * noise_scale(hand, settings, interval)
-    return hand.constrain(poses + settings.velocity * velocities * interval + noise)
+    """Add the process noise of an interval to drifted poses (N, D), within the joint limits."""
+    return hand.constrain(expected + rng.normal(size=expected.shape) * noise_scale(hand, settings, interval))

@@ -18,7 +18,7 @@ from spf.cost.problem import Problem, golden
 from spf.hand.kinematics import angles_of, rotation_about
 from spf.settings import Settings, setting
 
-__all__ = ["ProposalSettings", "propose"]
+__all__ = ["ProposalSettings", "propose", "recombine"]
 
 Array = NDArray[np.float64]
 _PROPOSALS = "Proposals"
@@ -30,6 +30,7 @@ _THUMBS = (
     (0.0, 0.5, 0.8, 0.9),
     (0.5, -0.2, 0.0, 0.0),
 )
+_BETTER = 0.98  # of the golden energy, from which a changed digit is kept
 _NEIGHBOUR = 0.22  # rad between neighbouring fingers, seen from the wrist
 
 
@@ -43,6 +44,11 @@ class ProposalSettings(Settings):
     palm_proposals: int = setting(
         24, "palm changes that are screened per structured particle", group=_PROPOSALS, low=0, high=1000
     )
+    recombination: float = setting(
+        0.3,
+        "share of SMD's rounds that a recombination of the particles' digits is given; 0 for none",
+        group=_PROPOSALS, low=0.0, high=1.0,
+    )  # fmt: skip
 
 
 def propose(
@@ -109,10 +115,45 @@ def curl_digits(problem: Problem, pose: Array, energy: float) -> tuple[Array, in
         options = _digit_options(best, digit)
         energies, _ = golden(problem, problem.hand.constrain(options))
         renders += len(options)
-        if energies.min() < 0.98 * energy:
+        if energies.min() < _BETTER * energy:
             energy = float(energies.min())
             best = problem.hand.constrain(options[int(np.argmin(energies))])
     return best, renders
+
+
+def recombine(problem: Problem, poses: Array, energies: Array) -> tuple[Array | None, int]:
+    """Give the best of some poses the digits of the others, or canonical ones, where its render gets better by that.
+
+    Partitioned sampling (MacCormick and Isard 2000) in its simplest form: a digit is nearly independent of the others.
+
+    Args:
+        problem: the frame's cost; its render judges.
+        poses: (N, D).
+        energies: (N,) their golden energies.
+
+    Returns:
+        (pose (D,), or None where nothing got better; number of renders).
+    """
+    order = np.argsort(energies)
+    best, energy = poses[order[0]].copy(), float(energies[order[0]])
+    before, renders = energy, 0
+    for digit in range(5):
+        options = _digit_options(best, digit)
+        others = np.repeat(best[None], len(poses) - 1, axis=0)
+        columns = _digit_entries(len(best), digit)
+        others[:, columns] = poses[order[1:]][:, columns]
+        options = problem.hand.constrain(np.concatenate([others, options]))
+        tried, _ = golden(problem, options)
+        renders += len(options)
+        if tried.min() < _BETTER * energy:
+            energy = float(tried.min())
+            best = options[int(np.argmin(tried))]
+    return (best, renders) if energy < before else (None, renders)
+
+
+def _digit_entries(dofs: int, digit: int) -> list[int]:
+    """Entries of a pose that belong to a digit."""
+    return [*range(6 + 4 * digit, 10 + 4 * digit), *([25 + digit] if dofs > 26 and digit > 0 else [])]
 
 
 def _digit_options(pose: Array, digit: int) -> Array:

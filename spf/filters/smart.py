@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spf.cost.problem import Problem, costs, golden, make_problem
 from spf.cost.settings import CostSettings
-from spf.filters.dynamics import DynamicsSettings, noise_scale, predict
+from spf.filters.dynamics import DynamicsSettings, drift, noise_scale, predict
 from spf.filters.kde import log_correction, paper_window, silverman_window
 from spf.filters.particles import ParticleSet, ess, normalise, weighted_mean
-from spf.filters.proposals import ProposalSettings, propose
+from spf.filters.proposals import ProposalSettings, propose, recombine
 from spf.filters.resampling import systematic
 from spf.filters.step import Clock, State, StepInfo, recentred
 from spf.hand.model import Hand
@@ -91,12 +92,25 @@ def step(
     problem = make_problem(hand, observation, settings, state.reference, rng, spheres)
     ancestors = systematic(state.particles.log_weights, settings.n, rng)  # (a) resample
     before = state.particles.poses[ancestors]
-    predicted = predict(hand, before, state.particles.velocities[ancestors], interval, settings, rng)  # (b) predict
+    expected = drift(hand, before, state.particles.velocities[ancestors], interval, settings)
+    predicted = predict(hand, expected, interval, settings, rng)  # (b) predict
     clock("predict")
     predicted, origins, screened = propose(problem, state.estimate, predicted, settings, rng)
+    jumped = np.array([origin != "dynamics" for origin in origins])
+    expected[jumped] = predicted[jumped]
     clock("propose")
-    optimised, trajectories, iterations = _optimise(problem, predicted, settings, interval, rng, record, effort)  # (c)
+    optimised, trajectories, iterations = _optimise(  # (c) optimise
+        problem, predicted, expected, settings, interval, rng, record, effort
+    )
     clock("optimise")
+    mixed = _recombined(problem, optimised, settings, interval, rng, record)
+    if mixed is not None:
+        optimised[mixed.place], before[mixed.place] = mixed.pose, before[mixed.source]
+        origins = (*origins[: mixed.place], "recombined", *origins[mixed.place + 1 :])
+        if mixed.trajectory is not None:
+            trajectories = (*trajectories[: mixed.place], mixed.trajectory, *trajectories[mixed.place + 1 :])
+        iterations += mixed.evaluations
+    clock("recombine")
     samples = np.concatenate([predicted, optimised])  # (d) combine and correct
     window, log_c = _correction(hand, predicted, optimised, settings, interval)
     clock("correct")
@@ -109,6 +123,7 @@ def step(
     estimate_energy, estimate_golden, estimate_overlap = (float(part[0]) for part in judged)
     estimate_log_likelihood = float(_log_likelihood(judged[0], judged[1], settings)[0])
     clock("estimate")
+    before[jumped] = optimised[jumped]  # a jump is no motion
     velocities = (samples - np.concatenate([before, before])) / interval
     new = State(ParticleSet(samples, velocities, log_weights), state.reference, estimate, observation.time)
     count = settings.n
@@ -125,27 +140,59 @@ def step(
 def _optimise(
     problem: Problem,
     predicted: Array,
+    expected: Array,
     settings: SpfSettings,
     interval: float,
     rng: np.random.Generator,
     record: bool,
     effort: float,
 ) -> tuple[Array, tuple[Trajectory, ...], int]:
-    """Run SMD from every predicted sample, independently and in parallel."""
-    noise = noise_scale(problem.hand, settings, interval)
-    precision = settings.points * settings.prediction_pull / noise**2
-    precision[:6] = 0.0  # the palm is free: only digits that nothing is seen of are held
+    """Run SMD from every predicted sample, independently and in parallel, pulled to what was expected without noise."""
+    precision = _precision(problem.hand, settings, interval)
     streams = rng.spawn(len(predicted))
 
     def run(index: int) -> tuple[Array, Trajectory | None, int]:
-        pose = predicted[index]
         return optimise(
-            problem, settings, streams[index], pose, prior=pose, precision=precision, effort=effort, record=record
-        )
+            problem, settings, streams[index], predicted[index],
+            prior=expected[index], precision=precision, effort=effort, record=record,
+        )  # fmt: skip
 
     results = map_threads(run, range(len(predicted)))
     traces = tuple(trace for _, trace, _ in results if trace is not None)
     return np.stack([pose for pose, _, _ in results]), traces, sum(count for _, _, count in results)
+
+
+def _precision(hand: Hand, settings: SpfSettings, interval: float) -> Array:
+    """Precision (D,) of the pull to the prediction; the palm is free: only digits that nothing is seen of are held."""
+    precision = settings.points * settings.prediction_pull / noise_scale(hand, settings, interval) ** 2
+    precision[:6] = 0.0
+    return precision
+
+
+class _Recombined(NamedTuple):
+    place: int  # of the sample that it takes the place of, the worst
+    source: int  # the sample that it is made from, the best
+    pose: Array
+    trajectory: Trajectory | None
+    evaluations: int
+
+
+def _recombined(
+    problem: Problem, optimised: Array, settings: SpfSettings, interval: float, rng: np.random.Generator, record: bool
+) -> _Recombined | None:
+    """Recombine the digits of the optimised samples (N, D) and optimise the result; None when nothing gets better."""
+    if settings.recombination == 0.0:
+        return None
+    energies, _ = golden(problem, optimised)
+    mixed, renders = recombine(problem, optimised, energies)
+    if mixed is None:
+        return None
+    pose, trajectory, iterations = optimise(
+        problem, settings, rng, mixed, prior=mixed, precision=_precision(problem.hand, settings, interval),
+        effort=settings.recombination, record=record,
+    )  # fmt: skip
+    evaluations = len(optimised) + renders + iterations
+    return _Recombined(int(np.argmax(energies)), int(np.argmin(energies)), pose, trajectory, evaluations)
 
 
 def _correction(

@@ -44,7 +44,8 @@ class StepInfo(NamedTuple):
     Attributes:
         reference: (3, 3) R_ref of all poses here.
         ancestors: (N,) which sample of the last frame each particle came from.
-        origins: (N,) proposal that each particle was predicted by.
+        origins: (N,) proposal that each particle was predicted by; "recombined" where the optimised sample was replaced by
+            a recombination of the others, whose trajectory starts there and not at the predicted sample.
         predicted, optimised: (N, D) and (M, D).
         cost_before, cost_after: (N,) and (M,) E of the predicted and of the optimised samples.
         golden: (N + M,) rendered comparison.

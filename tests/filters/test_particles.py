@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spf.filters.dynamics import DynamicsSettings, noise_scale, predict
+from spf.filters.dynamics import DynamicsSettings, drift, noise_scale, predict
 from spf.filters.particles import ess, normalise, weighted_mean
 from spf.filters.resampling import systematic
 from spf.hand import load_hand
@@ -55,7 +55,7 @@ def test_prediction_moves_by_velocity_and_noise_within_the_limits(rng: np.random
     poses = np.tile(hand.neutral_pose(), (4000, 1))
     velocities = np.zeros_like(poses)
     velocities[:, 0] = 0.3
-    moved = predict(hand, poses, velocities, 1 / 30, settings, rng)
+    moved = predict(hand, drift(hand, poses, velocities, 1 / 30, settings), 1 / 30, settings, rng)
     scale = noise_scale(hand, settings, 1 / 30)
     np.testing.assert_allclose(moved[:, :3].mean(axis=0), [0.01, 0.0, 0.0], atol=5e-4)
     np.testing.assert_allclose(moved[:, :6].std(axis=0), scale[:6], rtol=0.06)

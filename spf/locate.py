@@ -1,0 +1,108 @@
+"""Find hands in one frame: a search by rendering, polished by SMD. What the first pose and the recovery stand on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from spf.cost.problem import Problem, golden, make_problem
+from spf.filters import smart
+from spf.hand.kinematics import angles_of, joints_of, rotation_about
+from spf.hand.model import Hand
+from spf.observation import Observation
+from spf.optimisers.smd import optimise
+from spf.parallel import map_threads
+from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
+
+__all__ = ["Seeds", "around", "locate", "reach_of"]
+
+Array = NDArray[np.float64]
+_POLISHED = 10  # hypotheses that SMD is run from
+_APART = 0.0125  # m of mean joint distance between two hypotheses worth following
+_NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
+
+
+class Seeds(NamedTuple):
+    """Where a search begins.
+
+    Attributes:
+        poses: (N, D) relative to the camera's axes.
+        scales: (N,) relative to the hand that is searched for.
+    """
+
+    poses: Array
+    scales: Array
+
+
+def reach_of(hand: Hand) -> float:
+    """Radius (m) around the palm's centre that holds the hand and some of the arm."""
+    return 0.85 * hand.length + 0.02
+
+
+def locate(
+    hand: Hand,
+    observation: Observation,
+    places: Array,
+    settings: SearchSettings,
+    rng: np.random.Generator,
+    seeds: Seeds | None = None,
+) -> list[tuple[float, Array, float]]:
+    """Search one observation: [(scale, pose (D,) relative to the camera's axes, golden energy)], best first.
+
+    A search by rendering, over the whole observation or from seeds; its best polished by SMD at the size that the search
+    gave each, a finer search from those, and SMD again.
+    """
+    cost = smart.SpfSettings()
+    problem = make_problem(hand, observation, cost, np.eye(3), rng)
+    begun = None if seeds is None else (seeds.poses, seeds.scales)
+    found = search(problem, places, settings, rng) if begun is None else refine(problem, *begun, settings, rng)
+    for _ in range(2):
+        distinct = _spaced(hand, found, _POLISHED)
+        polished = _polish(problem, cost, found.poses[distinct], found.scales[distinct], rng)
+        poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
+        found = refine(problem, poses, scales, settings, rng)
+    return sorted(polished, key=lambda item: item[2])
+
+
+def _spaced(hand: Hand, found: Hypotheses, most: int) -> list[int]:
+    """Indices of the best hypotheses that differ from each other."""
+    kept: list[int] = []
+    joints: list[Array] = []
+    for index, pose in enumerate(found.poses):
+        own = joints_of(hand, pose)
+        if all(np.linalg.norm(own - other, axis=1).mean() > _APART for other in joints):
+            kept.append(index)
+            joints.append(own)
+        if len(kept) == most:
+            break
+    return kept
+
+
+def _polish(
+    problem: Problem, cost: smart.SpfSettings, poses: Array, scales: Array, rng: np.random.Generator
+) -> list[tuple[float, Array, float]]:
+    """SMD from each pose at its own scale; (scale, pose, golden energy), never worse than before."""
+
+    def run(item: tuple[Array, float, np.random.Generator]) -> tuple[float, Array, float]:
+        rough, scale, seed = item
+        sized = make_problem(problem.hand.scaled(scale), problem.observation, cost, np.eye(3), seed)
+        pose, _, _ = optimise(sized, cost, seed, rough)
+        before, after = golden(sized, np.stack([rough, pose]))[0]
+        return (scale, pose, float(after)) if after < before else (scale, rough, float(before))
+
+    return map_threads(run, list(zip(poses, scales, rng.spawn(len(poses)), strict=True)))
+
+
+def around(hand: Hand, pose: Array, rng: np.random.Generator) -> Seeds:
+    """Poses around one (D,): the palm moved and turned a little, the digits anywhere."""
+    poses = np.repeat(pose[None], _NEAR_SEEDS, axis=0)
+    poses[:, :3] += rng.normal(scale=_NEAR_MOVED, size=(_NEAR_SEEDS, 3))
+    turns = Rotation.from_rotvec(rng.normal(scale=_NEAR_TURNED, size=(_NEAR_SEEDS, 3)))
+    palm = rotation_about(pose[3:6])
+    poses[:, 3:6] = [angles_of(turn @ palm) for turn in turns.as_matrix()]
+    poses[:, 6:] = random_digits(hand, _NEAR_SEEDS, rng)
+    poses[0] = pose
+    return Seeds(poses, np.ones(_NEAR_SEEDS))

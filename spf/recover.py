@@ -1,0 +1,68 @@
+"""Find a lost hand of known shape again: near where it was lost first, then anywhere in the frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from spf.frame import Frame
+from spf.hand.kinematics import rotation_about
+from spf.hand.model import Hand
+from spf.locate import around, locate, reach_of
+from spf.observation import observe
+from spf.search import SearchSettings
+from spf.segmentation import find_regions
+
+__all__ = ["recover"]
+
+Array = NDArray[np.float64]
+_FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
+_JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose
+
+
+def recover(
+    frame: Frame, hand: Hand, limit: float, last: Array, within: float, missing: int, rng: np.random.Generator
+) -> Array | None:
+    """Look for a lost hand of known shape in a frame.
+
+    Args:
+        frame: the depth image.
+        hand: the calibrated hand.
+        limit: golden energy under which a pose is believed.
+        last: (D,) the pose that it was lost in, relative to the camera's axes.
+        within: m that its palm can have moved since.
+        missing: frames since it was lost: the longer, the less counts how it was held.
+        rng: randomness.
+
+    Returns:
+        Its pose (D,) relative to the camera's axes, or None when nothing explains the depth well enough.
+    """
+    settings = SearchSettings(islands=10, kept=4, generations=25, scale_spread=0.0)
+    remembered = 1.0 / (1.0 + missing / _FORGOTTEN)
+
+    def unlikely(pose: Array) -> float:
+        turn = Rotation.from_matrix(rotation_about(pose[3:6]) @ rotation_about(last[3:6]).T).magnitude()
+        return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi) * remembered
+
+    def believed(found: list[tuple[float, Array, float]]) -> Array | None:
+        rated = [
+            (energy + unlikely(pose), pose)
+            for _, pose, energy in found
+            if energy < limit and np.linalg.norm(pose[:3] - last[:3]) < within
+        ]
+        return min(rated, key=lambda item: item[0])[1] if rated else None
+
+    near = observe(frame, last[:3], reach_of(hand))
+    if not near.is_empty:
+        pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
+        if pose is not None:
+            return pose
+    for region in find_regions(frame)[:2]:
+        observation = observe(frame, region.centre, region.radius)
+        if observation.is_empty:
+            continue
+        pose = believed(locate(hand, observation, region.points, settings, rng))
+        if pose is not None:
+            return pose
+    return None
