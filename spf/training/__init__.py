@@ -1,0 +1,1 @@
+"""Train the network that proposes hands, on nothing but our own renders. The only package that uses torch."""

@@ -1,0 +1,136 @@
+"""Say how good a network is: ``python -m spf.training.evaluate [NETWORK.onnx] [--recording FOLDER …]``.
+
+On samples never trained on (other hands, other scenes), in millimetres of a hand of the bundled mesh's size; and, single
+frame by single frame, on recordings with truth whose joints are defined in :mod:`spf.joint_definitions`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.frame import Frame
+from spf.hand.kinematics import angles_of, joints_of, pose_hand
+from spf.hand.model import load_hand
+from spf.joint_definitions import corrected_joints, offsets_of
+from spf.learned import layout
+from spf.learned.guesses import Guess, decode, search_hand
+from spf.learned.network import Network, load_network
+from spf.segmentation import find_regions
+from spf.sessions import open_session
+from spf.training.generator import Batch, Generator
+
+__all__ = ["evaluate_recording", "evaluate_synthetic", "main"]
+
+Array = NDArray[np.float64]
+
+_HELD_OUT_SEED, _HELD_OUT_SHAPES = 7_000_000, 80
+
+
+def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_OUT_SEED) -> dict[str, float]:
+    """Measure on held-out samples.
+
+    Returns:
+        median joint errors, mm, of the most probable and of the best hypothesis (both as predicted and posed), of the
+        palm's centre, of the palm's rotation in degrees, of the size in per cent; and how often side and presence are right.
+    """
+    batch = Generator(seed, _HELD_OUT_SHAPES).batch(0, samples, left_share=0.5)
+    straight, mirrored = network.outputs(batch.crops), network.outputs(batch.crops[:, :, ::-1])
+    there = batch.present > 0.5
+    rightness = straight[:, layout.RIGHT] - mirrored[:, layout.RIGHT]
+    shown = [int(n) for n in np.flatnonzero(there)]
+    rows = [_sample_errors(batch, n, straight[n] if batch.right[n] else mirrored[n]) for n in shown]
+    medians = {name: float(np.median([row[name] for row in rows])) for name in rows[0]}
+    return medians | {
+        "right_side": float(np.mean((rightness[there] > 0.0) == (batch.right[there] > 0.5))),
+        "right_presence": float(np.mean((straight[:, layout.PRESENT] > 0.0) == there)),
+    }
+
+
+def _sample_errors(batch: Batch, n: int, numbers: Array) -> dict[str, float]:
+    """Errors of one sample, whose numbers are of the crop in which its hand is a right one."""
+    length = load_hand("right").length
+    unit = 1e3 * length * float(np.exp(-batch.log_sizes[n]))  # sides of the cube to mm of the bundled hand
+    truth, palm = batch.points[n, :21], batch.points[n, 21]
+    found = sorted(decode(numbers, "right", np.zeros(3), 1.0, np.eye(3), 0.0), key=lambda g: -g.log_weight)
+    predicted = [unit * float(np.linalg.norm(g.joints - truth, axis=1).mean()) for g in found]
+    posed = [unit * float(np.linalg.norm(_posed_joints(g) - truth, axis=1).mean()) for g in found]
+    turned = angles_of(found[0].reference @ batch.rotations[n].T)
+    return {
+        "top_joints_mm": predicted[0],
+        "best_joints_mm": min(predicted),
+        "top_posed_mm": posed[0],
+        "best_posed_mm": min(posed),
+        "palm_mm": unit * float(np.linalg.norm(found[0].pose[:3] - palm)),
+        "rotation_degrees": float(np.degrees(np.linalg.norm(turned))),
+        "size_per_cent": 100.0 * abs(float(np.log(found[0].scale * length) - batch.log_sizes[n])),
+    }
+
+
+def _posed_joints(guess: Guess) -> Array:
+    return joints_of(load_hand(guess.side).scaled(guess.scale), guess.pose, guess.reference)
+
+
+def evaluate_recording(network: Network, folder: Path, step: int = 5) -> dict[str, float]:
+    """Measure on every ``step``-th frame of a recording of a right hand, each for itself, at unknown size and side."""
+    session = open_session(folder)
+    offsets = offsets_of(session.format)
+    if offsets is None:
+        raise SystemExit(f"What the joints of {session.format} mean is not known; see spf/joint_definitions.py.")
+    rows = [_frame_errors(network, session[index], offsets) for index in range(0, len(session), step)]
+    kept = [row for row in rows if row]
+    return {name: float(np.median([row[name] for row in kept])) for name in kept[0] if name != "right_side"} | {
+        "right_side": float(np.mean([row["right_side"] for row in kept])),
+        "frames": float(len(kept)),
+    }
+
+
+def _frame_errors(network: Network, frame: Frame, offsets: Array) -> dict[str, float]:
+    regions = find_regions(frame, most=1)
+    if not regions or frame.truth is None:
+        return {}
+    found = search_hand(network, frame.depth, frame.camera, regions[0].centre)
+    right = [guess for guess in found if guess.side == "right"]
+    errors = [_recording_error(guess, frame.truth.joints, offsets) for guess in right]
+    return {
+        "top_posed_mm": errors[0],
+        "best_posed_mm": min(errors),
+        "scale": right[0].scale,
+        "right_side": float(found[0].side == "right"),
+    }
+
+
+def _recording_error(guess: Guess, truth: Array, offsets: Array) -> float:
+    hand = load_hand(guess.side).scaled(guess.scale)
+    joints = corrected_joints(hand, pose_hand(hand, guess.pose, guess.reference), offsets)
+    return 1e3 * float(np.nanmean(np.linalg.norm(joints - truth, axis=1)))
+
+
+def main() -> None:
+    """Run the command."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "network", nargs="?", type=Path, help="an .onnx file; the one that comes with the project if none"
+    )
+    parser.add_argument("--samples", type=int, default=2000)
+    parser.add_argument("--recording", type=Path, action="append", default=[])
+    options = parser.parse_args()
+    network = load_network(options.network)
+    report: dict[str, Any] = {"samples_seen": network.about.get("samples_seen")}
+    report["synthetic"] = evaluate_synthetic(network, options.samples)
+    for folder in options.recording:
+        report[folder.name] = evaluate_recording(network, folder)
+    print(json.dumps({k: _rounded(v) for k, v in report.items()}, indent=2))
+
+
+def _rounded(value: Any) -> Any:
+    return {k: round(v, 3) for k, v in value.items()} if isinstance(value, dict) else value
+
+
+if __name__ == "__main__":
+    main()

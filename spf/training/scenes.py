@@ -1,0 +1,207 @@
+"""Draw scenes at random: where the hand is and how it is turned, its forearm, other things, and the sensor.
+
+Every scene is laid out in the frame of its crop's camera, with the cube's centre at (0, 0, away).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.kernels.samples import LARGEST_PICTURE, SampleScenes
+from spf.kernels.sensing import FAULTS
+from spf.learned.layout import CROP_SIZE, EXTENT_PER_LENGTH
+from spf.synthetic.solids import ellipsoid, tube
+from spf.synthetic.trajectory import PALM_TO_SENSOR
+from spf.training.articulations import draw_articulations
+from spf.training.shapes import ShapeTable
+
+__all__ = ["Scenes", "draw_scenes", "other_faces", "rotations_about"]
+
+Array = NDArray[np.float64]
+
+_HAND_MIDDLE = np.array([-0.005, -0.005, -0.035])  # m, middle of the joints of the bundled hand, model frame
+_RINGS, _BLOBS = 10, 3
+_EMPTY_SHARE = 0.08
+_POOL = 1 << 22
+_ABSENT = -1.0  # coordinates of what is not drawn: behind the camera
+
+_RING_ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_TUBE = tube(
+    np.stack([np.zeros(_RINGS), np.zeros(_RINGS), np.linspace(0.0, 1.0, _RINGS)], 1), np.ones((_RINGS, 2)), _RING_ACROSS
+)
+_BALL = ellipsoid(np.zeros(3), np.ones(3), rings=9)
+
+
+class Scenes(NamedTuple):
+    """N scenes.
+
+    Attributes:
+        kernel: what the kernel draws.
+        left: (N,) whether the crop is to be mirrored, so that it shows a left hand.
+    """
+
+    kernel: SampleScenes
+    left: NDArray[np.bool_]
+
+
+def other_faces(first: int) -> NDArray[np.int32]:
+    """Return the faces of the forearm and the blobs, whose vertices begin at a number."""
+    counts = np.cumsum([first, len(_TUBE.vertices), *([len(_BALL.vertices)] * _BLOBS)])
+    return np.concatenate(
+        [_TUBE.faces + counts[0], *(_BALL.faces + start for start in counts[1:-1])], dtype=np.int32, casting="unsafe"
+    )
+
+
+def rotations_about(axis: int, angles: Array) -> Array:
+    """Return rotations (N, 3, 3) about a coordinate axis, for angles (N,) in radians."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turned = np.tile(np.eye(3), (len(angles), 1, 1))
+    turned[:, i, i] = turned[:, j, j] = np.cos(angles)
+    turned[:, j, i] = np.sin(angles)
+    turned[:, i, j] = -turned[:, j, i]
+    return turned
+
+
+def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share: float) -> Scenes:
+    """Draw n scenes, of which a share are to be mirrored."""
+    shape = rng.integers(len(shapes.sizes), size=n)
+    size = shapes.sizes[shape]
+    extents = EXTENT_PER_LENGTH * shapes.lengths[shape] * np.exp(rng.uniform(-0.32, 0.34, n))
+    away = extents / np.exp(rng.uniform(np.log(0.2), np.log(0.9), n))
+    orientations = _orientations(rng, n)
+    middles = _jitter(rng, n) * extents[:, None]
+    middles[:, 2] += away
+    empty = rng.random(n) < _EMPTY_SHARE
+    poses = np.zeros((n, 26))
+    poses[:, 6:] = draw_articulations(rng, n)
+    poses[:, :3] = middles - np.einsum("nij,nj->ni", orientations, size[:, None] * _HAND_MIDDLE)
+    focal = np.exp(rng.uniform(np.log(0.6), np.log(1.9), n)) * CROP_SIZE * away / extents
+    sizes = np.minimum(np.ceil(focal * extents / away * 1.03) + 4, LARGEST_PICTURE).astype(np.int64)
+    kernel = SampleScenes(
+        shape=shape,
+        drawn=~empty,
+        poses=poses,
+        orientations=orientations,
+        others=_others(rng, shapes, shape, poses, orientations, away, extents, empty),
+        planes=_planes(rng, n, extents, np.where(empty, 0.35, 0.13)),
+        away=away,
+        extents=extents,
+        focal=focal,
+        sizes=sizes,
+        faults=_faults(rng, n),
+        starts=rng.integers(_POOL, size=n),
+    )
+    return Scenes(kernel, rng.random(n) < left_share)
+
+
+def _orientations(rng: np.random.Generator, n: int) -> Array:
+    """All yaw; pitch and roll about "fingers up", or any; a few turned in any way."""
+    yaw = rng.uniform(-np.pi, np.pi, n)
+    pitch = np.radians(rng.normal(0.0, 35.0, n))
+    roll = np.where(rng.random(n) < 0.75, np.radians(rng.normal(0.0, 40.0, n)), rng.uniform(-np.pi, np.pi, n))
+    turned = rotations_about(2, roll) @ rotations_about(0, pitch) @ rotations_about(1, yaw) @ PALM_TO_SENSOR
+    anyhow = rng.random(n) < 0.12
+    turned[anyhow] = _any_rotations(rng, int(anyhow.sum()))
+    return np.asarray(turned)
+
+
+def _jitter(rng: np.random.Generator, n: int) -> Array:
+    """Offsets (n, 3) of the hand from the cube's centre, in sides of the cube: mostly small, sometimes large."""
+    near = rng.normal(0.0, 0.04, (n, 3))
+    direction = rng.normal(size=(n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    far = direction * (0.3 * np.cbrt(rng.random((n, 1))))
+    return np.where(rng.random((n, 1)) < 0.68, near, far)
+
+
+def _others(
+    rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], poses: Array, orientations: Array,
+    away: Array, extents: Array, empty: NDArray[np.bool_],
+) -> Array:  # fmt: skip
+    """Vertices (n, W, 3) of forearm and blobs."""
+    arm = _forearms(rng, shapes, shape, poses, orientations)
+    arm[rng.random(len(shape)) < np.where(empty, 0.4, 0.12)] = _ABSENT
+    centres = np.stack([np.zeros_like(away), np.zeros_like(away), away], axis=1)
+    blobs = [_blobs(rng, centres, extents, np.where(empty, 0.4, 0.13)) for _ in range(_BLOBS)]
+    return np.concatenate([arm, *blobs], axis=1)
+
+
+def _forearms(
+    rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], poses: Array, orientations: Array
+) -> Array:
+    """Tapered tubes (n, W, 3) from inside the wrist, bent at it, short or long, with or without a sleeve."""
+    n = len(shape)
+    size = shapes.lengths[shape]
+    bend = rotations_about(0, np.radians(rng.normal(0.0, 24.0, n))) @ rotations_about(
+        1, np.radians(rng.normal(0.0, 11.0, n))
+    )
+    along = np.linspace(0.0, 1.0, _RINGS)
+    length = np.where(rng.random(n) < 0.75, rng.uniform(0.9, 1.6, n), rng.uniform(0.05, 0.9, n)) * size
+    growth = rng.uniform(0.05, 0.75, n)[:, None] * np.minimum(along * length[:, None] / size[:, None], 1.0)
+    sleeve = (along > rng.uniform(0.05, 1.0, (n, 1))) * np.where(rng.random(n) < 0.3, rng.uniform(0.0, 0.6, n), 0.0)[
+        :, None
+    ]
+    radii = shapes.wrist_radii[shape][:, None, :] * (rng.uniform(0.85, 1.15, n)[:, None] + growth + sleeve)[..., None]
+    sides = (len(_TUBE.vertices) - 2) // _RINGS
+    ring = np.concatenate([np.repeat(np.arange(_RINGS), sides), [0, _RINGS - 1]])
+    local = np.empty((n, len(ring), 3))
+    local[..., :2] = _TUBE.vertices[None, :, :2] * radii[:, ring]
+    local[..., 2] = along[ring] * length[:, None] - 0.02 * size[:, None]
+    turn = orientations @ bend
+    start = poses[:, :3] + np.einsum("nij,nj->ni", orientations, shapes.wrist_middles[shape])
+    return np.asarray(local @ turn.transpose(0, 2, 1) + start[:, None, :])
+
+
+def _blobs(rng: np.random.Generator, centres: Array, extents: Array, share: Array) -> Array:
+    """Ellipsoids (n, W, 3) beside or behind the hand: limbs, faces, things."""
+    placed = np.full((len(extents), len(_BALL.vertices), 3), _ABSENT)
+    there = np.flatnonzero(rng.random(len(extents)) < share)
+    n, extent = len(there), extents[there]
+    direction = rng.normal(size=(n, 3))
+    direction[:, 2] = np.abs(direction[:, 2]) * np.where(rng.random(n) < 0.85, 1.0, -1.0)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    radii = np.exp(rng.uniform(np.log(0.06), np.log(0.5), (n, 3))) * extent[:, None]
+    reach = (rng.uniform(0.3, 0.65, n) * extent)[:, None] + 0.6 * radii.mean(axis=1, keepdims=True)
+    turn = _any_rotations(rng, n)
+    middle = centres[there] + direction * reach
+    placed[there] = (_BALL.vertices[None] * radii[:, None, :]) @ turn.transpose(0, 2, 1) + middle[:, None]
+    return placed
+
+
+def _any_rotations(rng: np.random.Generator, n: int) -> Array:
+    """Rotations (n, 3, 3), all orientations alike."""
+    q, _ = np.linalg.qr(rng.normal(size=(n, 3, 3)))
+    return np.asarray(q * np.sign(np.linalg.det(q))[:, None, None])
+
+
+def _planes(rng: np.random.Generator, n: int, extents: Array, share: Array) -> Array:
+    """Planes (n, 4) behind the hand: a table or a wall."""
+    tilt, around = np.radians(np.abs(rng.normal(0.0, 35.0, n))).clip(0.0, 1.2), rng.uniform(0.0, 2.0 * np.pi, n)
+    normal = np.stack([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), -np.cos(tilt)], axis=1)
+    planes = np.concatenate([normal, (rng.uniform(0.03, 0.5, n) * extents)[:, None]], axis=1)
+    planes[rng.random(n) >= share] = 0.0
+    return planes
+
+
+def _faults(rng: np.random.Generator, n: int) -> Array:
+    """Sensors' faults (n, len(FAULTS)), from nearly none to more than real ones have; one in fourteen has none."""
+    clean = rng.random(n) < 0.07
+    drawn = {
+        "ragged": rng.uniform(0.0, 1.0, n) * (rng.random(n) < 0.7),
+        "flying": rng.uniform(0.0, 0.5, n) * (rng.random(n) < 0.5),
+        "eroded": rng.uniform(0.0, 0.8, n) * (rng.random(n) < 0.4),
+        "white": 0.004 * rng.random(n) ** 2,
+        "grainy": 0.006 * rng.random(n) ** 1.5 * (rng.random(n) < 0.8),
+        "grain": rng.uniform(2.0, 8.0, n),
+        "holes": np.where(rng.random(n) < 0.6, rng.uniform(1.9, 4.0, n), 9.0),
+        "hole_size": rng.uniform(2.0, 9.0, n),
+        "steepest": np.where(rng.random(n) < 0.6, rng.uniform(2.5, 7.0, n), 1e6),
+        "smooths": (rng.random(n) < 0.4).astype(float),
+        "step": rng.choice([0.0001, 0.001, 0.002, 0.004], size=n),
+    }
+    faults = np.stack([drawn[name] for name in FAULTS], axis=1)
+    faults[clean] = [0.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 4.0, 1e6, 0.0, 0.0001]
+    return faults
