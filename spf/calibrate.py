@@ -33,8 +33,8 @@ _NAMES = len(_PRIOR_SPREAD)
 _POOL = 250
 _BACKGROUND = 0.2
 _DELTA = 1e-3
-_SIZES = (0.88, 0.91, 0.94, 0.97, 1.0, 1.03)
-_AS_GOOD = 1.03
+_SIZES = (0.88, 0.92, 0.96, 1.0, 1.04)
+_AS_GOOD = 0.03  # share by which a golden energy may be higher and weigh 1/e
 
 
 class View(NamedTuple):
@@ -54,7 +54,7 @@ class View(NamedTuple):
 def size_by_render(
     views: list[View], shape: HandShape, rng: np.random.Generator
 ) -> tuple[HandShape, list[View], float]:
-    """Choose the scale whose render explains the views best, the smallest of those that do it about equally well.
+    """Average the scales whose renders explain the views, each weighed by how well it does.
 
     Gauss-Newton swells the hand a little, because an uncovered pixel pulls harder than a model point beside the hand.
 
@@ -62,14 +62,17 @@ def size_by_render(
         (shape, views with their poses in that shape, mean golden energy).
     """
     settings, descent = CostSettings(), SmdSettings()
-    tried: list[tuple[HandShape, list[View], float]] = []
+    energies = []
     for factor in _SIZES:
-        sized = shape._replace(scale=shape.scale * factor)
-        hand = sized.hand()
+        hand = shape._replace(scale=shape.scale * factor).hand()
         posed = _repose(_repose(views, hand, settings, descent, rng), hand, settings, descent, rng)
-        tried.append((sized, posed, _mean_golden(posed, hand, settings, rng)))
-    least = min(energy for _, _, energy in tried)
-    return next(one for one in tried if one[2] < _AS_GOOD * least)
+        energies.append(_mean_golden(posed, hand, settings, rng))
+    apart = np.array(energies) / min(energies) - 1.0
+    weights = np.exp(-apart / _AS_GOOD)
+    sized = shape._replace(scale=shape.scale * float(np.exp(np.log(_SIZES) @ weights / weights.sum())))
+    hand = sized.hand()
+    posed = _repose(_repose(views, hand, settings, descent, rng), hand, settings, descent, rng)
+    return sized, posed, _mean_golden(posed, hand, settings, rng)
 
 
 def _mean_golden(views: list[View], hand: Hand, settings: CostSettings, rng: np.random.Generator) -> float:

@@ -22,7 +22,8 @@ from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Side, load_hand
 from spf.hand.shape import HandShape
-from spf.locate import locate, reach_of
+from spf.learned.network import available_network
+from spf.locate import locate, reach_of, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings, size_penalty
 from spf.segmentation import find_regions
@@ -38,6 +39,7 @@ _INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convi
 _CONVINCING = 0.36  # mean golden energy that ends the search at once …
 _CLEAR_MARGIN = 0.03  # … when the other side is this much worse
 _VALIDATION_FRAMES = 16
+_SUGGESTION_ENOUGH = 0.3  # golden energy under which the network's suggestions need no search beside them
 _GOOD_PLACE = 0.4  # golden energy under which no farther place is looked at
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
@@ -201,20 +203,26 @@ def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
 def _hypotheses(
     frame: Frame, sides: Sequence[Side], shape: HandShape | None, rng: np.random.Generator
 ) -> list[_Hypothesis]:
-    """The best different hypotheses of each side, over the places where a hand may be."""
+    """The best different hypotheses of each side, over the places where a hand may be.
+
+    The network's suggestions are polished first, and the whole region is searched where none of them convinces.
+    """
+    network, _ = available_network()
     regions = find_regions(frame)[:2]
+    looks = [] if network is None else [suggested(network, frame, region, sides, shape) for region in regions]
     result: list[_Hypothesis] = []
     for side in sides:
         hand = shape.hand() if shape else load_hand(side)
         settings = SearchSettings(scale_spread=0.0) if shape else SearchSettings()
         found: list[_Hypothesis] = []
-        for region in regions:
+        for number, region in enumerate(regions):
             observation = observe(frame, region.centre, region.radius)
             if observation.is_empty:
                 continue
-            for scale, pose, energy in locate(hand, observation, region.points, settings, rng):
-                base = shape or HandShape(side, scale=scale)
-                found.append(_Hypothesis(base, pose, energy))
+            located = locate(hand, observation, region.points, settings, rng, looks[number][side]) if looks else []
+            if not located or located[0][2] > _SUGGESTION_ENOUGH:
+                located += locate(hand, observation, region.points, settings, rng)
+            found += [_Hypothesis(shape or HandShape(side, scale=scale), pose, e) for scale, pose, e in located]
             if min((h.energy for h in found), default=1.0) < _GOOD_PLACE:
                 break
         result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,18 +11,24 @@ from scipy.spatial.transform import Rotation
 
 from spf.cost.problem import Problem, golden, make_problem
 from spf.filters import smart
+from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
-from spf.hand.model import Hand
+from spf.hand.model import Hand, Side, load_hand
+from spf.hand.shape import HandShape
+from spf.learned.guesses import Guess, search_hand
+from spf.learned.network import Network
 from spf.observation import Observation
 from spf.optimisers.smd import optimise
 from spf.parallel import map_threads
 from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
+from spf.segmentation import Region
 
-__all__ = ["Seeds", "around", "locate", "reach_of"]
+__all__ = ["Seeds", "around", "locate", "reach_of", "suggested"]
 
 Array = NDArray[np.float64]
 _POLISHED = 10  # hypotheses that SMD is run from
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
+_LOOKS = (0.1, 0.3, 0.5, 0.7, 0.9)  # quantiles of a region, along its longest axis, that the network looks at
 _NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
 
 
@@ -106,3 +113,28 @@ def around(hand: Hand, pose: Array, rng: np.random.Generator) -> Seeds:
     poses[:, 6:] = random_digits(hand, _NEAR_SEEDS, rng)
     poses[0] = pose
     return Seeds(poses, np.ones(_NEAR_SEEDS))
+
+
+def suggested(
+    network: Network, frame: Frame, region: Region, sides: Sequence[Side], shape: HandShape | None
+) -> dict[Side, Seeds]:
+    """Let the network look along a region for hands of each side, at the size of a shape or at any.
+
+    Returns:
+        What it suggests, as poses relative to the camera's axes; scales are relative to the mesh, or to the shape's hand.
+    """
+    size = None if shape is None else shape.hand().length / load_hand(shape.side).length
+    middle = region.points.mean(axis=0)
+    axis = np.linalg.svd(region.points - middle, full_matrices=False)[2][0]
+    along = np.quantile((region.points - middle) @ axis, _LOOKS)
+    found: dict[Side, list[Guess]] = {side: [] for side in sides}
+    for place in along:
+        for guess in search_hand(network, frame.depth, frame.camera, middle + place * axis, size, sides):
+            found[guess.side].append(guess)
+    return {side: _seeds(guesses, size) for side, guesses in found.items()}
+
+
+def _seeds(guesses: list[Guess], size: float | None) -> Seeds:
+    poses = np.array([guess.pose for guess in guesses])
+    poses[:, 3:6] = [angles_of(guess.reference) for guess in guesses]
+    return Seeds(poses, np.array([guess.scale if size is None else 1.0 for guess in guesses]))

@@ -12,7 +12,7 @@ from spf.frame import Camera, Frame
 from spf.kernels.cost_inputs import NORMAL, SURFACE_COLUMNS, UNKNOWN, ObservationArrays
 from spf.kernels.surface import coarse_grid, fill_holes, foreground, nearest_pixels, surface_points
 
-__all__ = ["Observation", "camera_numbers", "observe"]
+__all__ = ["Observation", "Suggestion", "camera_numbers", "observe"]
 
 Mask = NDArray[np.uint8]
 
@@ -21,6 +21,18 @@ OUTSIDE_RAMP = 0.005  # m beside the hand at which covering a cell costs its ful
 _LEAST_COMPONENT = 0.0002  # m²: specks smaller than 2 cm² are no part of a hand
 _OCCLUDER_GAP = 0.03  # m in front of the hand's nearest pixel from which a surface hides it
 _MARGIN = 10  # pixels around the foreground
+
+
+class Suggestion(NamedTuple):
+    """A pose that something else than the tracker suggests for a frame.
+
+    Attributes:
+        pose: (26,) relative to ``reference``.
+        reference: (3, 3).
+    """
+
+    pose: NDArray[np.float64]
+    reference: NDArray[np.float64]
 
 
 class Observation(NamedTuple):
@@ -34,6 +46,7 @@ class Observation(NamedTuple):
         depth: (H, W) float32 m, cleaned; 0 where the label is not HAND.
         time: s.
         index: of the frame.
+        suggestions: poses that may be tried as further particles, see :mod:`spf.learned`.
     """
 
     arrays: ObservationArrays
@@ -43,6 +56,7 @@ class Observation(NamedTuple):
     depth: NDArray[np.float32]
     time: float
     index: int  # type: ignore[assignment]  # a frame has an index; a tuple's method of that name is not missed
+    suggestions: tuple[Suggestion, ...] = ()
 
     @property
     def is_empty(self) -> bool:

@@ -29,7 +29,7 @@ def recover(
     Args:
         frame: the depth image.
         hand: the calibrated hand.
-        limit: golden energy under which a pose is believed.
+        limit: golden energy under which a pose is believed; one that is held otherwise than it was needs a lower one.
         last: (D,) the pose that it was lost in, relative to the camera's axes.
         within: m that its palm can have moved since.
         missing: frames since it was lost: the longer, the less counts how it was held.
@@ -46,12 +46,10 @@ def recover(
         return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi) * remembered
 
     def believed(found: list[tuple[float, Array, float]]) -> Array | None:
-        rated = [
-            (energy + unlikely(pose), pose)
-            for _, pose, energy in found
-            if energy < limit and np.linalg.norm(pose[:3] - last[:3]) < within
-        ]
-        return min(rated, key=lambda item: item[0])[1] if rated else None
+        near = [(energy, pose) for _, pose, energy in found if np.linalg.norm(pose[:3] - last[:3]) < within]
+        rated = [(energy + unlikely(pose), pose) for energy, pose in near]
+        best = min(rated, key=lambda item: item[0], default=None)
+        return best[1] if best is not None and best[0] < limit else None
 
     near = observe(frame, last[:3], reach_of(hand))
     if not near.is_empty:

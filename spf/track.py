@@ -17,11 +17,13 @@ from spf.cost.spheres import digit_spheres
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
-from spf.hand.model import Hand
+from spf.hand.model import Hand, load_hand
 from spf.initialise import Start
 from spf.kernels.cost import Spheres
+from spf.learned.guesses import extent_of, guesses
+from spf.learned.network import Network, available_network
 from spf.locate import reach_of
-from spf.observation import Observation, observe
+from spf.observation import Observation, Suggestion, observe
 from spf.recover import recover
 from spf.settings import Settings
 from spf.trackers import TRACKERS
@@ -46,6 +48,7 @@ class Tracking(NamedTuple):
         hand: of that shape.
         spheres: of the collision term.
         seed: of all randomness.
+        network: suggests poses; None where it is not asked.
     """
 
     tracker: str
@@ -54,6 +57,7 @@ class Tracking(NamedTuple):
     hand: Hand
     spheres: Spheres
     seed: int
+    network: Network | None
 
 
 class TrackState(NamedTuple):
@@ -119,7 +123,7 @@ def begin(
 ) -> tuple[Tracking, TrackState]:
     """Set up a run from a first pose, which holds a thirtieth of a second before ``time``, its frame's, in seconds."""
     hand = start.shape.hand(free_dip=free_dip)
-    tracking = Tracking(tracker, settings, start, hand, digit_spheres(hand), seed)
+    tracking = Tracking(tracker, settings, start, hand, digit_spheres(hand), seed, available_network()[0])
     return tracking, _restart(tracking, start.pose, start.reference, time - _FRAME)
 
 
@@ -151,6 +155,8 @@ def track_frame(
     searched = time.perf_counter()
     observation = observe(frame, state.filter.estimate[:3], reach_of(tracking.hand))
     observed = time.perf_counter()
+    observation = _with_suggestions(tracking, state, frame, observation)
+    suggested = time.perf_counter()
     if observation.is_empty:
         state = state._replace(lost=True, missing=state.missing + 1)
         return state, _lost(tracking, state, frame, began)
@@ -160,7 +166,12 @@ def track_frame(
     )  # fmt: skip
     new = _judged(tracking, state, filter_state, info)
     joints = joints_of(tracking.hand, info.estimate, info.reference)
-    timings = {"search": searched - began, "observe": observed - searched, **info.timings}
+    timings = {
+        "search": searched - began,
+        "observe": observed - searched,
+        "suggest": suggested - observed,
+        **info.timings,
+    }
     seconds = time.perf_counter() - began
     result = TrackedFrame(
         frame.index, frame.time, info.estimate, info.reference, joints, new.lost, was_lost and not new.lost,
@@ -168,6 +179,16 @@ def track_frame(
         info, observation,
     )  # fmt: skip
     return new, result
+
+
+def _with_suggestions(tracking: Tracking, state: TrackState, frame: Frame, observation: Observation) -> Observation:
+    """Let the network look at where the hand was, if the tracker listens to it."""
+    if tracking.network is None or observation.is_empty or not getattr(tracking.settings, "learned", False):
+        return observation
+    middle = joints_of(tracking.hand, state.filter.estimate, state.filter.reference).mean(axis=0)
+    size = tracking.hand.length / load_hand(tracking.hand.side).length
+    seen = guesses(tracking.network, frame.depth, frame.camera, middle, extent_of(size), (tracking.hand.side,))
+    return observation._replace(suggestions=tuple(Suggestion(guess.pose, guess.reference) for guess in seen))
 
 
 def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.Generator) -> TrackState:

@@ -77,6 +77,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "golden": 0.0,
         "structured": 0.0,
         "recombination": 0.0,
+        "learned": False,
         "prediction_pull": 0.0,
         "velocity": 1.0,
     },

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from spf.cost.problem import Problem, golden
 from spf.hand.kinematics import angles_of, rotation_about
+from spf.hand.model import DIP_PER_PIP
 from spf.settings import Settings, setting
 
 __all__ = ["ProposalSettings", "propose", "recombine"]
@@ -44,6 +45,12 @@ class ProposalSettings(Settings):
     palm_proposals: int = setting(
         24, "palm changes that are screened per structured particle", group=_PROPOSALS, low=0, high=1000
     )
+    learned: bool = setting(
+        True, "add a particle where the network sees the hand, in the frames that it is asked in", group=_PROPOSALS
+    )
+    learned_prior: float = setting(
+        0.1, "prior of the network's particle, relative to one of the others", group=_PROPOSALS, low=1e-6, high=1.0
+    )
     recombination: float = setting(
         0.3,
         "share of SMD's rounds that a recombination of the particles' digits is given; 0 for none",
@@ -54,7 +61,7 @@ class ProposalSettings(Settings):
 def propose(
     problem: Problem, estimate: Array, predicted: Array, settings: ProposalSettings, rng: np.random.Generator
 ) -> tuple[Array, tuple[str, ...], int]:
-    """Replace the last particles' predictions by structured proposals.
+    """Replace the last particles' predictions by structured proposals, and add the best of the suggested poses.
 
     Args:
         problem: the frame's cost; its render judges the proposals.
@@ -64,7 +71,7 @@ def propose(
         rng: randomness.
 
     Returns:
-        (predicted (N, D), origin of each, number of renders).
+        (predicted (N, D), or (N + 1, D) with a suggestion; origin of each; number of renders).
     """
     count = int(settings.structured * len(predicted))
     origins = ["dynamics"] * (len(predicted) - count) + ["structured"] * count
@@ -74,7 +81,24 @@ def propose(
         energies, _ = golden(problem, candidates)
         pose, used = curl_digits(problem, candidates[int(np.argmin(energies))], float(energies.min()))
         result[index], renders = pose, renders + len(candidates) + used
+    if settings.learned and problem.observation.suggestions:
+        poses = _suggested(problem)
+        energies, _ = golden(problem, poses)
+        result, renders = np.concatenate([result, poses[[np.argmin(energies)]]]), renders + len(poses)
+        origins.append("learned")
     return result, tuple(origins), renders
+
+
+def _suggested(problem: Problem) -> Array:
+    """The suggested poses (K, D), relative to the problem's R_ref."""
+    hand, poses = problem.hand, []
+    for pose, reference in problem.observation.suggestions:
+        palm = rotation_about(pose[3:6]) @ reference @ problem.reference.T
+        full = hand.neutral_pose()
+        full[:26], full[26:] = pose, DIP_PER_PIP * pose[13:26:4][: hand.dofs - 26]
+        full[3:6] = angles_of(palm)
+        poses.append(full)
+    return hand.constrain(np.array(poses))
 
 
 def palm_changes(problem: Problem, predicted: Array, estimate: Array, count: int, rng: np.random.Generator) -> Array:

@@ -37,7 +37,7 @@ def step(
     """Track one frame: the Smart Particle Filter's step with one particle, no noise and nothing but its optimum kept."""
     alone = smart.SpfSettings(
         **settings.to_dict(), n=1, noise_translation=1e-5, noise_rotation=1e-4, noise_digits=1e-4, velocity=0.0,
-        structured=0.0, recombination=0.0, correction=False, keep_predicted=False, prediction_pull=0.0,
+        structured=0.0, recombination=0.0, learned=False, correction=False, keep_predicted=False, prediction_pull=0.0,
     )  # fmt: skip
     return smart.step(
         rng, state, observation, hand, alone, spheres=spheres or digit_spheres(hand), record=record, effort=effort

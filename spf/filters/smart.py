@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -97,6 +98,9 @@ def step(
     clock("predict")
     predicted, origins, screened = propose(problem, state.estimate, predicted, settings, rng)
     jumped = np.array([origin != "dynamics" for origin in origins])
+    added = len(predicted) - settings.n  # the network's particle, which has the heaviest sample for its ancestor
+    ancestors = np.append(ancestors, np.full(added, np.argmax(state.particles.log_weights)))
+    before, expected = state.particles.poses[ancestors], np.concatenate([expected, predicted[settings.n :]])
     expected[jumped] = predicted[jumped]
     clock("propose")
     optimised, trajectories, iterations = _optimise(  # (c) optimise
@@ -116,7 +120,7 @@ def step(
     clock("correct")
     energy, golden_energy, overlap = _judge(problem, samples)
     log_likelihood = _log_likelihood(energy, golden_energy, settings)
-    log_weights = normalise(log_c + log_likelihood + _kept(settings))  # (e) weigh
+    log_weights = normalise(log_c + log_likelihood + _log_prior(origins, settings))  # (e) weigh
     clock("weigh")
     estimate = weighted_mean(samples, log_weights)  # (f) estimate
     judged = _judge(problem, estimate[None])
@@ -126,7 +130,7 @@ def step(
     before[jumped] = optimised[jumped]  # a jump is no motion
     velocities = (samples - np.concatenate([before, before])) / interval
     new = State(ParticleSet(samples, velocities, log_weights), state.reference, estimate, observation.time)
-    count = settings.n
+    count = len(predicted)
     info = StepInfo(
         state.reference, ancestors, origins, predicted, optimised, energy[:count], energy[count:], golden_energy, overlap,
         log_likelihood, log_c, log_weights, ess(log_weights), float(np.exp(log_weights[count:]).sum()), window,
@@ -213,9 +217,12 @@ def _log_likelihood(energy: Array, golden_energy: Array, settings: SpfSettings) 
     return -(energy + settings.golden * settings.points * golden_energy) / settings.sigma2
 
 
-def _kept(settings: SpfSettings) -> Array:
-    """Log-prior of the samples: -inf for predicted ones that are not kept."""
-    return np.repeat([0.0 if settings.keep_predicted else -np.inf, 0.0], settings.n)
+def _log_prior(origins: tuple[str, ...], settings: SpfSettings) -> Array:
+    """Log-prior of the predicted, then the optimised samples; -inf for predicted ones that are not kept."""
+    predicted = np.zeros(len(origins)) if settings.keep_predicted else np.full(len(origins), -np.inf)
+    predicted[settings.n :] += math.log(settings.learned_prior)
+    optimised = np.array([math.log(settings.learned_prior) if origin == "learned" else 0.0 for origin in origins])
+    return np.concatenate([predicted, optimised])
 
 
 def _judge(problem: Problem, poses: Array) -> tuple[Array, Array, Array]:

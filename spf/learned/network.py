@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -47,6 +48,15 @@ def load_network(path: str | Path | None = None) -> Network:
         return _load(Path(path))
     with as_file(files("spf.learned") / "assets" / "hand-proposal.onnx") as bundled:
         return _load(bundled)
+
+
+@cache
+def available_network() -> tuple[Network | None, str]:
+    """Return the network that comes with the project, or None and one sentence that says what is missing."""
+    try:
+        return load_network(), ""
+    except NetworkError as error:
+        return None, f"{error} Until then hands are looked for by rendering alone."
 
 
 def _load(path: Path) -> Network:
