@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from spf.cost.problem import Problem, correspondences, golden, make_problem
 from spf.cost.settings import LENGTH, CostSettings
+from spf.cost.spheres import digit_spheres
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
 from spf.hand.shape import HandShape, lengths_of_digits
@@ -76,7 +77,8 @@ def size_by_render(
 
 
 def _mean_golden(views: list[View], hand: Hand, settings: CostSettings, rng: np.random.Generator) -> float:
-    problems = [make_problem(hand, view.observation, settings, view.reference, rng) for view in views]
+    spheres = digit_spheres(hand)
+    problems = [make_problem(hand, view.observation, settings, view.reference, rng, spheres) for view in views]
     energies = [golden(problem, view.pose[None])[0][0] for problem, view in zip(problems, views, strict=True)]
     return float(np.mean(energies))
 
@@ -113,9 +115,9 @@ def fit_shape(
         shapes = [_shape(first, parameters)]
         shapes += [_shape(first, parameters + _DELTA * np.eye(_NAMES)[i]) for i in np.flatnonzero(free)]
         hands = [shape.hand() for shape in shapes]
-        seeds = rng.spawn(len(views))
+        seeds, spheres = rng.spawn(len(views)), digit_spheres(hands[0])
         problems = [
-            make_problem(hands[0], view.observation, settings, view.reference, seed, pool=_POOL)
+            make_problem(hands[0], view.observation, settings, view.reference, seed, spheres, pool=_POOL)
             for view, seed in zip(views, seeds, strict=True)
         ]
         normals = map_threads(
@@ -225,11 +227,11 @@ def _repose(
     views: list[View], hand: Hand, settings: CostSettings, descent: SmdSettings, rng: np.random.Generator
 ) -> list[View]:
     """Re-optimise every view's pose for a hand."""
-    seeds = rng.spawn(len(views))
+    seeds, spheres = rng.spawn(len(views)), digit_spheres(hand)
 
     def run(item: tuple[View, np.random.Generator]) -> View:
         view, seed = item
-        problem = make_problem(hand, view.observation, settings, view.reference, seed)
+        problem = make_problem(hand, view.observation, settings, view.reference, seed, spheres)
         pose, _, _ = optimise(problem, descent, seed, view.pose)
         return view._replace(pose=pose)
 

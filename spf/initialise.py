@@ -265,12 +265,12 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
     """Fit the shape to what the start tracks, its size first, and take the pose along."""
     ahead = frames[start.frame : start.frame + _CALIBRATION_FRAMES]
     shape, pose, energy = start.shape, start.pose, start.energy
-    for turn, refine_all in enumerate((False, True)):
+    for turn, (refine_all, iterations) in enumerate(((False, 3), (True, 6))):
         report("Calibrating the hand", 0.7 + 0.15 * turn)
         tracked = _track(_Hypothesis(shape, pose, energy), ahead, rng)
         every = max(1, len(tracked) // _VIEWS)
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
-        shape, views, energy = fit_shape(views, shape, rng, iterations=8, refine=refine_all)
+        shape, views, energy = fit_shape(views, shape, rng, iterations=iterations, refine=refine_all)
         pose = _relative_to_camera(views[0])
     shape, views, energy = size_by_render(views, shape, rng)
     pose = _relative_to_camera(views[0])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spf.cost.problem import Problem, golden, make_problem
+from spf.cost.spheres import scaled_spheres
 from spf.filters import smart
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
@@ -95,7 +96,8 @@ def _polish(
 
     def run(item: tuple[Array, float, np.random.Generator]) -> tuple[float, Array, float]:
         rough, scale, seed = item
-        sized = make_problem(problem.hand.scaled(scale), problem.observation, cost, np.eye(3), seed)
+        spheres = scaled_spheres(problem.spheres, scale)
+        sized = make_problem(problem.hand.scaled(scale), problem.observation, cost, np.eye(3), seed, spheres)
         pose, _, _ = optimise(sized, cost, seed, rough)
         before, after = golden(sized, np.stack([rough, pose]))[0]
         return (scale, pose, float(after)) if after < before else (scale, rough, float(before))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 
-__all__ = ["digit_spheres"]
+__all__ = ["digit_spheres", "scaled_spheres"]
 
 _PER_BONE = 3
 _ALLOWANCE = 0.85  # skin is soft: spheres are a little smaller than the digit
@@ -38,6 +38,11 @@ def digit_spheres(hand: Hand) -> Spheres:
     digit = np.array(digits)
     partners = [_partners(digit, own, metacarpal=bone == 1) for own, bone in zip(digits, bones, strict=True)]
     return Spheres(np.array(bones, np.int32), np.array(centres), np.array(radii), np.array(partners, np.int32))
+
+
+def scaled_spheres(spheres: Spheres, factor: float) -> Spheres:
+    """Return the spheres of a hand enlarged by a factor."""
+    return spheres._replace(centre=spheres.centre * factor, radius=spheres.radius * factor)
 
 
 def _partners(digit: NDArray[np.int_], own: int, *, metacarpal: bool) -> tuple[int, int]:

@@ -305,9 +305,8 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> N
     """Return the area-weighted unit normals (V, 3) of a mesh."""
     corners = vertices[faces]
     face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.zeros_like(vertices)
-    for corner in range(3):
-        np.add.at(normals, faces[:, corner], face_normals)
+    corner, each = faces.T.ravel(), np.tile(face_normals, (3, 1))
+    normals = np.stack([np.bincount(corner, each[:, axis], len(vertices)) for axis in range(3)], axis=1)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.divide(normals, length, out=np.tile([0.0, 0.0, 1.0], (len(vertices), 1)), where=length > 0)
 
