@@ -15,7 +15,7 @@ from spf.track import TrackedFrame, Tracking, TrackState
 __all__ = ["Entry", "Results", "Summary", "joint_error", "same_rules", "thinned"]
 
 PATH_POSES = 26  # poses kept of a trajectory of SMD: enough to draw it
-MEMORY = 256 * 2**20  # bytes of entries that one page keeps
+MEMORY = 128 * 2**20  # bytes of entries that one lane of a page keeps
 
 
 class Entry(NamedTuple):
@@ -44,6 +44,7 @@ class Summary(NamedTuple):
         golden, overlap: how well the render explains the depth, nan while lost.
         error: mean distance of the joints from the truth, m; nan where there is no truth.
         seconds: spent on the frame.
+        tracking: what it was tracked with.
     """
 
     frame: int
@@ -55,6 +56,7 @@ class Summary(NamedTuple):
     overlap: float
     error: float
     seconds: float
+    tracking: Tracking
 
 
 class Results:
@@ -76,7 +78,7 @@ class Results:
         self._sizes[index] = _bytes(entry)
         self._summaries[index] = Summary(
             index, result.joints, result.lost, result.recovered, result.ess, result.golden, result.overlap,
-            joint_error(result.joints, frame), result.seconds,
+            joint_error(result.joints, frame), result.seconds, entry.tracking,
         )  # fmt: skip
         while sum(self._sizes.values()) > self._memory and len(self._entries) > 1:
             oldest = next(iter(self._entries))

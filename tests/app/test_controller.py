@@ -11,7 +11,7 @@ from app.runner import Runner
 from app.server import bundled
 from app.state import State
 from app.views.depth import depth_picture
-from app.views.scenes import PICTURES, scenes_of, view_of
+from app.views.scenes import SCENES, view_of
 from spf.render import ViewCamera
 
 SAMPLE = bundled()["open-close"]
@@ -62,8 +62,8 @@ def test_start_tracks_the_first_frame_and_step_the_next_ones(page):
     assert state.frame == state.origin.start.frame == 0
     act(controller.step, controller.step)
     assert state.frame == 2
-    assert [summary.frame for summary in state.results.summaries] == [0, 1, 2]
-    assert all(np.isfinite(summary.error) for summary in state.results.summaries)
+    assert [summary.frame for summary in state.lane.results.summaries] == [0, 1, 2]
+    assert all(np.isfinite(summary.error) for summary in state.lane.results.summaries)
 
 
 def test_a_changed_setting_takes_effect_with_the_next_step(page):
@@ -72,18 +72,18 @@ def test_a_changed_setting_takes_effect_with_the_next_step(page):
     state.change("n", 7)
     act(controller.step)
     assert len(state.entry.result.info.predicted) == 7
-    assert len(state.results.entry(0).result.info.predicted) == 4
+    assert len(state.lane.results.entry(0).result.info.predicted) == 4
 
 
 def test_a_jump_back_shows_the_stored_frame_and_a_step_shows_it_again(page):
     state, controller = page
     started(state, controller)
     act(lambda: controller.jump(3))
-    stored = state.results.entry(1)
+    stored = state.lane.results.entry(1)
     act(lambda: controller.jump(0), controller.step)
     assert state.frame == 1
     assert state.entry is stored
-    assert state.results.last == 3
+    assert state.lane.results.last == 3
 
 
 def test_a_step_from_an_earlier_frame_with_other_settings_tracks_it_anew(page):
@@ -92,7 +92,7 @@ def test_a_step_from_an_earlier_frame_with_other_settings_tracks_it_anew(page):
     act(lambda: controller.jump(3), lambda: controller.jump(0))
     state.change("n", 2)
     act(controller.step)
-    assert state.frame == state.results.last == 1
+    assert state.frame == state.lane.results.last == 1
     assert len(state.entry.result.info.predicted) == 2
 
 
@@ -131,7 +131,7 @@ def test_a_cancelled_jump_keeps_what_was_tracked(page):
 
     state.param.watch(cancel_at_two, "frame")
     act(lambda: controller.jump(50))
-    assert state.results.last == 2
+    assert state.lane.results.last == 2
     assert (state.busy, state.error) == (False, "")
     act(controller.step)
     assert state.frame == 3
@@ -149,7 +149,7 @@ def test_an_unexpected_error_is_a_sentence_in_the_page_and_a_traceback_in_the_lo
     assert "the moon is full" in state.error
     assert "Traceback" not in state.error
     assert caplog.records[-1].exc_info is not None
-    assert state.results.last == 0
+    assert state.lane.results.last == 0
     assert not state.busy
 
 
@@ -169,15 +169,14 @@ def test_a_missing_file_is_one_sentence(page, choice):
 def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(page):
     state, controller = page
     started(state, controller)
-    scenes = scenes_of(state.entry)
-    assert set(scenes) == set(PICTURES)
+    scenes = {name: scene(state.entry) for name, scene in SCENES.items()}
     assert len(scenes["particles"].meshes) == 8
     assert len(scenes["reconstruction"].meshes) == 1
     assert scenes["trajectories"].lines[0].paths.shape[0] == 4 * 6
-    assert isinstance(view_of(state.entry, 0.1, 0.2, 1.5), ViewCamera)
+    assert isinstance(view_of([state.entry], 0.1, 0.2, 1.5), ViewCamera)
     frame = state.session[0]
     plain = depth_picture(frame)
-    full = depth_picture(frame, state.entry.result.observation, state.summary.joints, frame.truth.joints)
+    full = depth_picture(frame, state.entry.result.observation, [(state.summary.joints, (255, 255, 255))])
     assert plain.startswith(b"\xff\xd8")
     assert plain != full
 
