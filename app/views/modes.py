@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ from spf.render import Renderer
 __all__ = ["Modes"]
 
 
+_A_MOMENT = 0.1  # s in which the browser says what it is about to do, for it then is busy
 _SWITCH = {
     "& .MuiToggleButton-root": {
         "color": "white", "borderColor": "rgba(255, 255, 255, 0.5)", "padding": "3px 12px", "whiteSpace": "nowrap",
@@ -48,7 +50,11 @@ class Modes:
         )
 
         async def picked(event: Any) -> None:
+            if event.new == "compare" and self._several is None:
+                self._state.preparing = "Laying out the comparison"
+                await asyncio.sleep(_A_MOMENT)
             await show(event.new)
+            self._state.preparing = ""
 
         group.param.watch(picked, "value")
         return group
