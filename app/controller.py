@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from app.lane import Lane, Origin
-from app.results import Entry, thinned
+from app.results import Entry, entry_of
 from app.runner import CancelledError, Report, Runner
 from app.state import State
 from spf.errors import HandError, SpfError, StartError
@@ -257,7 +257,7 @@ def _frame_work(
         for tracking, before in plans:
             report("", 0.0)  # ends the work here if it was cancelled
             after, result = track_frame(tracking, before, frame, record=True)
-            entries.append(Entry(thinned(result), after, tracking))
+            entries.append(entry_of(result, after, tracking))
         return frame, entries
 
     return work

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.results import Seen
 from app.state import State
 from app.views.picture import Picture
 from spf.errors import SessionError
 from spf.frame import Camera, Frame
-from spf.observation import Observation
 from spf.render.palette import PREDICTED
 
 __all__ = ["Depth", "depth_picture"]
@@ -46,29 +46,29 @@ class Depth:
         except SessionError as error:
             state.error = str(error)
             return
-        observation = state.entry.result.observation if state.entry is not None else None
+        seen = state.entry.seen if state.entry is not None else None
         skeletons = [(frame.truth.joints, _TRUTH)] if state.with_truth and frame.truth is not None else []
         for lane in state.active:
             summary = lane.summary(state.frame)
             if summary is not None and not summary.lost:
                 skeletons.append((summary.joints, _ESTIMATE if self._mode == "one" else _rgb(lane.colour)))
-        self.pane.image = depth_picture(frame, observation, skeletons)
+        self.pane.image = depth_picture(frame, seen, skeletons)
 
 
 def depth_picture(
     frame: Frame,
-    observation: Observation | None = None,
+    seen: Seen | None = None,
     skeletons: Sequence[tuple[NDArray[np.float64], Colour]] = (),
 ) -> bytes:
     """Return a JPEG file of a frame.
 
     Args:
         frame: the depth image.
-        observation: what the tracker took for the hand: in colour, all else in grey; None colours everything.
+        seen: what the tracker took for the hand: in colour, all else in grey; None colours everything.
         skeletons: (joints (21, 3) m, NaN where unknown; colour) of each, the later over the earlier.
     """
     scale = _WIDTH / frame.depth.shape[1]
-    rgb = _coloured(frame.depth, None if observation is None else _region(frame, observation))
+    rgb = _coloured(frame.depth, None if seen is None else _region(frame, seen))
     size = (_WIDTH, round(frame.depth.shape[0] * scale))
     canvas = np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
     for joints, colour in skeletons:
@@ -83,11 +83,10 @@ def _rgb(css: str) -> Colour:
     return tuple(round(0.75 * part + 0.25 * 255) for part in (red, green, blue))
 
 
-def _region(frame: Frame, observation: Observation) -> NDArray[np.bool_]:
+def _region(frame: Frame, seen: Seen) -> NDArray[np.bool_]:
     region = np.zeros(frame.depth.shape, bool)
-    height, width = observation.depth.shape
-    top, left = observation.top, observation.left
-    region[top : top + height, left : left + width] = observation.depth > 0
+    height, width = seen.mask.shape
+    region[seen.top : seen.top + height, seen.left : seen.left + width] = seen.mask
     return region
 
 

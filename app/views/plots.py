@@ -15,6 +15,8 @@ from spf.render.palette import OPTIMISED, PREDICTED, RESIDUAL
 
 __all__ = ["AFTER", "BEFORE", "CALM", "LOSS", "FramePlot", "Plot", "calm_figure", "css", "heading"]
 
+_LEAST_FRAMES, _ROOM = 30, 1.25  # that the axis of frames shows at least, and of what is tracked
+
 
 def css(colour: tuple[float, float, float]) -> str:
     """Return a colour of the renders as the browser writes it."""
@@ -73,9 +75,12 @@ class FramePlot(Plot):
 
     def draw(self) -> None:
         """Replace the data and move the line."""
-        self._here.location = self.state.frame
-        if self.state.session is not None:
-            self.figure.x_range.update(start=-1, end=len(self.state.session))
+        state = self.state
+        self._here.location = state.frame
+        if state.session is not None:
+            furthest = max([state.frame, *(lane.results.last or 0 for lane in state.active)])
+            end = min(len(state.session), max(_LEAST_FRAMES, _ROOM * furthest))
+            self.figure.x_range.update(start=-0.02 * end, end=end)
         self.draw_frames()
 
     @abstractmethod

@@ -28,17 +28,17 @@ _PATH_JOINTS = np.array([0, 4, 8, 12, 16, 20])  # wrist and fingertips
 
 def reconstruction_of(entry: Entry, colour: Colour = HAND) -> Scene | None:
     """Return the estimated hand among the observed points; None while it is lost."""
-    result, hand = entry.result, entry.tracking.hand
-    if result.info is None or result.observation is None:
+    info, hand = entry.result.info, entry.tracking.hand
+    if info is None or entry.seen is None:
         return None
-    vertices = pose_hand(hand, result.info.estimate, result.info.reference).vertices
-    return reconstruction_scene(vertices, hand.faces, points=result.observation.hand_points, colour=colour)
+    vertices = pose_hand(hand, info.estimate, info.reference).vertices
+    return reconstruction_scene(vertices, hand.faces, points=entry.seen.points, colour=colour)
 
 
 def particles_of(entry: Entry) -> Scene | None:
     """Return the heaviest particles before and after optimisation, as hands; None while the hand is lost."""
-    info, observation, hand = entry.result.info, entry.result.observation, entry.tracking.hand
-    if info is None or observation is None:
+    info, seen, hand = entry.result.info, entry.seen, entry.tracking.hand
+    if info is None or seen is None:
         return None
     before, after = info.predicted_weights, info.optimised_weights
     heaviest = np.maximum(before, after) if len(after) else before
@@ -47,7 +47,7 @@ def particles_of(entry: Entry) -> Scene | None:
     def vertices(poses: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([pose_hand(hand, pose, info.reference).vertices for pose in poses[drawn]])
 
-    points = observation.hand_points
+    points = seen.points
     if not len(after):  # a filter that optimises nothing
         return particles_scene(
             vertices(info.predicted), None, hand.faces,
@@ -61,8 +61,8 @@ def particles_of(entry: Entry) -> Scene | None:
 
 def trajectories_of(entry: Entry) -> Scene | None:
     """Return the paths of wrist and fingertips during optimisation; None when none were recorded."""
-    info, observation, hand = entry.result.info, entry.result.observation, entry.tracking.hand
-    if info is None or observation is None or not info.trajectories:
+    info, seen, hand = entry.result.info, entry.seen, entry.tracking.hand
+    if info is None or seen is None or not info.trajectories:
         return None
     after = info.optimised_weights
     drawn = np.argsort(-after, kind="stable")[:_MOST_PATHS]
@@ -72,7 +72,7 @@ def trajectories_of(entry: Entry) -> Scene | None:
     for path, trace in zip(paths, traces, strict=True):
         for i in range(longest):  # a particle that converged early stays where it is
             path[i] = joints_of(hand, trace.poses[min(i, len(trace.poses) - 1)], info.reference)[_PATH_JOINTS]
-    return trajectories_scene(paths, weights=after[drawn], points=observation.hand_points)
+    return trajectories_scene(paths, weights=after[drawn], points=seen.points)
 
 
 #: Name → scene of each picture of one tracker.

@@ -29,7 +29,7 @@ class Table(Follower):
 
     def __init__(self, state: State) -> None:
         super().__init__(state, "compare", ("lanes", "lane", "rules", "mode"))
-        self.pane = pn.pane.HTML("", sizing_mode="stretch_both", margin=(0, 2))
+        self.pane = pn.pane.HTML("", sizing_mode="stretch_both", margin=(0, 2), styles={"overflow": "auto"})
 
     def draw(self) -> None:
         """Measure all lanes over the frames that every lane has."""
@@ -38,10 +38,12 @@ class Table(Follower):
         rows = "".join(_row(lane, state.last) for lane in state.lanes)
         first = None if state.origin is None else state.origin.start.frame
         frames = "No frame is tracked yet" if state.last is None else f"Frames {first} to {state.last}"
+        mixed = any(lane.is_mixed for lane in state.lanes)
+        note = " Mixed: the settings were changed on the way; restart to compare." if mixed else ""
         self.pane.object = (
             f"{_STYLE}<table class='lanes'><tr>{head}</tr>{rows}</table>"
             f"<div style='font:12px/1.6 Roboto,sans-serif;color:#5c6873;padding:4px 5px'>{frames}; means, and the median "
-            "time.</div>"
+            f"time.{note}</div>"
         )
 
 
@@ -67,7 +69,7 @@ def _mean(values: list[float]) -> float:
 
 def _row(lane: Lane, last: int | None) -> str:
     error, overlap, losses, lost, milliseconds = measures(lane, last)
-    mixed = "<br><small>settings changed on the way: restart to compare</small>" if lane.is_mixed else ""
+    mixed = " <small>(mixed)</small>" if lane.is_mixed else ""
     known = last is not None
     cells = (
         _number(error, ".1f"), _number(overlap, ".2f"), str(losses) if known else "–", str(lost) if known else "–",

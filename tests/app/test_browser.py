@@ -225,7 +225,7 @@ def test_trackers_are_compared_at_the_same_frame(page):
     lines = [line for line in columns(page, "ms") if line]  # each lane's, and none of the lane that is not there
     assert [len(line) for line in lines] == [4, 4, 4]
     assert all(0 < value < 100 for line in columns(page, "error") for value in line)
-    page.get_by_text("settings changed on the way").wait_for()
+    page.get_by_text("the settings were changed on the way", exact=False).wait_for()
     page.get_by_text("Frames 0 to 3", exact=False).wait_for()
     button(page, "One tracker").click()
     picture(page, "Particles before and after optimisation").wait_for()

@@ -156,7 +156,7 @@ def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(p
     assert isinstance(view_of([state.entry], 0.1, 0.2, 1.5), ViewCamera)
     frame = state.session[0]
     plain = depth_picture(frame)
-    full = depth_picture(frame, state.entry.result.observation, [(state.summary.joints, (255, 255, 255))])
+    full = depth_picture(frame, state.entry.seen, [(state.summary.joints, (255, 255, 255))])
     assert plain.startswith(b"\xff\xd8")
     assert plain != full
 
