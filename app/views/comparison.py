@@ -22,7 +22,7 @@ from spf.render import Colour, Renderer, Scene
 
 __all__ = ["Comparison"]
 
-_HAND_HEIGHT, _DEPTH_HEIGHT, _PLOT_HEIGHT = 256, 268, 196
+_HAND_HEIGHT, _DEPTH_HEIGHT, _PLOT_HEIGHT = 256, 304, 196
 _PALE = 0.35  # share of white in a hand of a lane's colour, so that its shading is seen
 
 
