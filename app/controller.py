@@ -9,26 +9,32 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from app.results import Entry, thinned
+from app.lane import Lane, Origin
+from app.results import Entry, entry_of
 from app.runner import CancelledError, Report, Runner
-from app.state import Origin, State
+from app.state import State
 from spf.errors import HandError, SpfError, StartError
 from spf.frame import Frame
 from spf.hand import read_hand_shape
 from spf.prepare import prepare
 from spf.sessions import Session, open_session
-from spf.track import Tracking, TrackState, begin, track_frame
+from spf.track import Tracking, TrackState, track_frame
 
 __all__ = ["Controller"]
 
 T = TypeVar("T")
 Open = Callable[[str, str | None], Session]
 Wanted = Callable[[], bool]
+Wait = Callable[[Report], None]
 _log = logging.getLogger(__name__)
 
 
 async def _at_once() -> None:
     """Wait for no picture: without a browser nobody draws one."""
+
+
+def _ready(_report: Report) -> None:
+    """Wait for no kernel: they are compiled when they are used."""
 
 
 class Controller:
@@ -39,6 +45,7 @@ class Controller:
         runner: its worker.
         open_: opens a session by path and camera file.
         drawn: waits until the browser has shown the latest frame, so that playing never piles up frames.
+        kernels: waits in the worker until the kernels are compiled, and reports meanwhile.
     """
 
     def __init__(
@@ -47,8 +54,9 @@ class Controller:
         runner: Runner,
         open_: Open = open_session,
         drawn: Callable[[], Awaitable[None]] = _at_once,
+        kernels: Wait = _ready,
     ) -> None:
-        self.state, self._runner, self._open, self.drawn = state, runner, open_, drawn
+        self.state, self._runner, self._open, self.drawn, self._kernels = state, runner, open_, drawn, kernels
         self._turn = 0  # counts what was cancelled, so that an action knows when it no longer is the one that runs
         self._advancing = asyncio.Lock()
 
@@ -70,17 +78,18 @@ class Controller:
 
     def _preparation(self) -> Callable[[Report], Origin]:
         """Return the work of Start, with everything that was chosen until now."""
-        state = self.state
-        session, tracker, settings, seed = state.session, state.tracker, state.settings, state.seed
+        state, kernels = self.state, self._kernels
+        session, seed = state.session, state.seed
         init = _chosen_file(state.pose_file, "pose") if state.init == "file" else state.init
         hand_file = _chosen_file(state.hand_file, "hand") if state.shape == "file" else None
         if session is None:
             raise StartError("Choose a session first.")
 
         def work(report: Report) -> Origin:
+            kernels(report)
             shape = read_hand_shape(hand_file) if hand_file else None
             start = prepare(session, init=init, shape=shape, seed=seed, progress=report)
-            return Origin(start, *begin(tracker, settings, start, seed, time=float(session.times[start.frame])))
+            return Origin(start, float(session.times[start.frame]), seed)
 
         return work
 
@@ -115,7 +124,7 @@ class Controller:
         if state.session is None or frame == state.frame:
             return
         self.cancel()
-        last = state.results.last
+        last = state.last
         if last is None or frame <= last:
             state.show(frame)
             return
@@ -131,8 +140,43 @@ class Controller:
             return
         self.cancel()
         async with self._doing("") as wanted:
-            state.begin(state.origin)
+            state.rewind()
             await self._advance(wanted)
+
+    async def show_mode(self, mode: str) -> None:
+        """Show one tracker, or compare several, at the frame that is shown."""
+        self.state.show_mode(mode)
+        await self._catch_up()
+
+    async def add_lane(self) -> None:
+        """Compare with one more tracker, from the same start to the frame that is shown."""
+        self.state.add_lane()
+        await self._catch_up()
+
+    async def choose(self, lane: Lane) -> None:
+        """Choose the lane whose settings are edited, and that is shown alone."""
+        self.state.choose(lane)
+        await self._catch_up()
+
+    async def remove_lane(self, lane: Lane) -> None:
+        """Compare without a lane."""
+        self.cancel()
+        self.state.remove_lane(lane)
+
+    async def _catch_up(self) -> None:
+        """Have every lane shown track as far as the frame shown, which is the same in all of them."""
+        state = self.state
+        if state.origin is None or state.is_tracked or state.frame < state.origin.start.frame:
+            return
+        self.cancel()
+        goal = state.frame
+        first = state.origin.start.frame if state.last is None else state.last + 1
+        async with self._doing(f"Tracking to frame {goal}") as wanted:
+            for index in range(first, goal + 1):
+                behind = [lane for lane in state.active if lane.summary(index) is None]
+                await self._track(index, behind, wanted)
+                state.share = (index + 1 - first) / (goal + 1 - first)
+            state.show(goal)
 
     def cancel(self) -> None:
         """Give up what runs in the background; everything tracked so far stays."""
@@ -154,29 +198,24 @@ class Controller:
             index = state.next_frame
             if index is None:
                 return False
-            if not state.is_current(index):
-                tracking, before = self._before(index)
-                entry, frame = await self._run(_frame_work(state.session, index, tracking, before))
-                state.results.add(entry, frame)
+            behind = [lane for lane in state.active if not lane.is_current(index)]
+            await self._track(index, behind, wanted)
             state.show(index)
             return True
 
-    def _before(self, index: int) -> tuple[Tracking, TrackState]:
-        """Return how a frame is to be tracked now, and the tracker's state before it."""
-        state, origin = self.state, self.state.origin
-        assert origin is not None
-        tracking = origin.tracking._replace(tracker=state.tracker, settings=state.settings)
-        if index == origin.start.frame:
-            assert state.session is not None
-            time = float(state.session.times[index])
-            return begin(state.tracker, state.settings, origin.start, origin.tracking.seed, time=time)
-        entry = state.results.entry(index - 1)
-        if entry is None:
-            raise StartError(
-                f"The particles of frame {index - 1} are no longer in memory: go on from the last tracked frame, "
-                "or restart."
-            )
-        return tracking, entry.state
+    async def _track(self, index: int, lanes: list[Lane], wanted: Wanted) -> None:
+        """Track a frame in some lanes: in all of them or in none."""
+        if not wanted():
+            raise CancelledError
+        state = self.state
+        assert state.session is not None
+        assert state.origin is not None
+        if not lanes:
+            return
+        plans = [lane.before(index, state.origin) for lane in lanes]
+        frame, entries = await self._run(_frame_work(state.session, index, plans))
+        for lane, entry in zip(lanes, entries, strict=True):
+            lane.results.add(entry, frame)
 
     async def _run(self, work: Callable[[Report], T]) -> T:
         return await self._runner.run(work, self._watch)
@@ -209,15 +248,17 @@ class Controller:
 
 
 def _frame_work(
-    session: Session | None, index: int, tracking: Tracking, before: TrackState
-) -> Callable[[Report], tuple[Entry, Frame]]:
-    """Return the work that tracks one frame."""
-    assert session is not None
+    session: Session, index: int, plans: list[tuple[Tracking, TrackState]]
+) -> Callable[[Report], tuple[Frame, list[Entry]]]:
+    """Return the work that tracks one frame in some lanes, one after the other so that each has the machine to itself."""
 
-    def work(_report: Report) -> tuple[Entry, Frame]:
-        frame = session[index]
-        after, result = track_frame(tracking, before, frame, record=True)
-        return Entry(thinned(result), after, tracking), frame
+    def work(report: Report) -> tuple[Frame, list[Entry]]:
+        frame, entries = session[index], []
+        for tracking, before in plans:
+            report("", 0.0)  # ends the work here if it was cancelled
+            after, result = track_frame(tracking, before, frame, record=True)
+            entries.append(entry_of(result, after, tracking))
+        return frame, entries
 
     return work
 

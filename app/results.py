@@ -12,24 +12,41 @@ from spf.optimisers.trajectory import Trajectory
 from spf.settings import Settings
 from spf.track import TrackedFrame, Tracking, TrackState
 
-__all__ = ["Entry", "Results", "Summary", "joint_error", "same_rules", "thinned"]
+__all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules"]
 
 PATH_POSES = 26  # poses kept of a trajectory of SMD: enough to draw it
-MEMORY = 256 * 2**20  # bytes of entries that one page keeps
+MEMORY = 128 * 2**20  # bytes of entries that one lane of a page keeps
 
 
 class Entry(NamedTuple):
     """Everything of one tracked frame.
 
     Attributes:
-        result: of the frame.
+        result: of the frame, without its observation.
         state: after it, to track on from here.
         tracking: what it was tracked with.
+        seen: what was taken for the hand; None while nothing was.
     """
 
     result: TrackedFrame
     state: TrackState
     tracking: Tracking
+    seen: Seen | None
+
+
+class Seen(NamedTuple):
+    """What views show of an observation: a small part of it.
+
+    Attributes:
+        top, left: corner of the mask in the depth image.
+        mask: (h, w) pixels that were taken for the hand.
+        points: (M, 3) m, the hand's observed points.
+    """
+
+    top: int
+    left: int
+    mask: NDArray[np.bool_]
+    points: NDArray[np.float32]
 
 
 class Summary(NamedTuple):
@@ -44,6 +61,7 @@ class Summary(NamedTuple):
         golden, overlap: how well the render explains the depth, nan while lost.
         error: mean distance of the joints from the truth, m; nan where there is no truth.
         seconds: spent on the frame.
+        tracking: what it was tracked with.
     """
 
     frame: int
@@ -55,6 +73,7 @@ class Summary(NamedTuple):
     overlap: float
     error: float
     seconds: float
+    tracking: Tracking
 
 
 class Results:
@@ -76,7 +95,7 @@ class Results:
         self._sizes[index] = _bytes(entry)
         self._summaries[index] = Summary(
             index, result.joints, result.lost, result.recovered, result.ess, result.golden, result.overlap,
-            joint_error(result.joints, frame), result.seconds,
+            joint_error(result.joints, frame), result.seconds, entry.tracking,
         )  # fmt: skip
         while sum(self._sizes.values()) > self._memory and len(self._entries) > 1:
             oldest = next(iter(self._entries))
@@ -123,12 +142,16 @@ def joint_error(joints: NDArray[np.float64], frame: Frame) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def thinned(result: TrackedFrame) -> TrackedFrame:
-    """Return a result whose trajectories hold at most PATH_POSES poses each."""
-    if result.info is None:
-        return result
-    traces = tuple(_thin(trace) for trace in result.info.trajectories)
-    return result._replace(info=result.info._replace(trajectories=traces))
+def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking) -> Entry:
+    """Return what is kept of a frame: trajectories of at most PATH_POSES poses each, and what views show of the depth."""
+    info, observation = result.info, result.observation
+    if info is not None:
+        info = info._replace(trajectories=tuple(_thin(trace) for trace in info.trajectories))
+    seen = None
+    if observation is not None:
+        points = observation.hand_points.astype(np.float32)
+        seen = Seen(observation.top, observation.left, observation.depth > 0, points)
+    return Entry(result._replace(info=info, observation=None), state, tracking, seen)
 
 
 def _thin(trace: Trajectory) -> Trajectory:
@@ -147,7 +170,7 @@ def _bytes(value: object) -> int:
     if isinstance(value, np.ndarray):
         return value.nbytes
     if isinstance(value, Entry):  # `tracking` is shared by all frames
-        return _bytes(tuple(value.result)) + _bytes(tuple(value.state))
+        return _bytes(tuple(value.result)) + _bytes(tuple(value.state)) + _bytes(value.seen)
     if isinstance(value, tuple):
         return sum(_bytes(part) for part in value)
     return 0

@@ -27,10 +27,11 @@ class _Job:
         self.progress: tuple[str, float] | None = None
 
     def report(self, text: str, share: float) -> None:
-        """Say what is being done; ends the work here if it was cancelled meanwhile."""
+        """Say what is being done, if anything is to be said; ends the work here if it was cancelled meanwhile."""
         if self.cancelled.is_set():
             raise CancelledError
-        self.progress = (text, share)
+        if text:
+            self.progress = (text, share)
 
 
 class Runner:

@@ -1,4 +1,4 @@
-"""What all pages of a server share: one renderer, and the sessions that someone has opened."""
+"""What all pages of a server share: compiled kernels, one renderer, and the sessions that someone has opened."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from pathlib import Path
 
 import panel as pn
 
+from app.kernels import Kernels
 from spf.render import Renderer
 from spf.sessions import Session, open_session
 
-__all__ = ["SAMPLES", "bundled", "open_shared", "renderer"]
+__all__ = ["SAMPLES", "bundled", "kernels", "open_shared", "renderer"]
 
 #: Where the sample sessions are, and where new captures land.
 SAMPLES = Path(__file__).resolve().parent.parent / "sessions"
@@ -22,6 +23,14 @@ _KEPT = 3600  # s that an opened session is kept for the next who asks
 def renderer() -> Renderer:
     """Return the server's renderer, started at the first call."""
     shared = Renderer()
+    atexit.register(shared.close)
+    return shared
+
+
+@lru_cache(maxsize=1)
+def kernels() -> Kernels:
+    """Return the server's kernels, being compiled since the first call."""
+    shared = Kernels()
     atexit.register(shared.close)
     return shared
 

@@ -2,41 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import param
 
-from app.results import Entry, Results, Summary, same_rules
+from app.lane import Lane, Origin
+from app.results import Entry, Summary
 from spf.errors import SettingError
-from spf.initialise import Start
+from spf.initialise import Doubted
 from spf.sessions import Session
-from spf.settings import Settings
-from spf.track import Tracking, TrackState
-from spf.trackers import PRESETS, TRACKERS, make_settings
+from spf.trackers import TRACKERS
 
-__all__ = ["INITS", "Origin", "State"]
+__all__ = ["COLOURS", "INITS", "MODES", "SHAPES", "State"]
 
 #: Ways to the first pose and to the hand's shape, by the words of the page.
 INITS = {"Find it automatically": "auto", "Take it from the truth": "truth", "Read a pose file": "file"}
 SHAPES = {"Calibrate it from the depth": "depth", "Read a hand file": "file"}
 
+#: What the page shows: one tracker with all its particles, or several beside each other.
+MODES = {"One tracker": "one", "Compare": "compare"}
+
+#: Colours of the lanes, after Okabe and Ito: people of every colour vision can tell them apart.
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")
+
 _LEAST_ZOOM, _MOST_ZOOM = 0.3, 6.0
-
-
-class Origin(NamedTuple):
-    """Where a run begins: its start, and the tracker's state before the first frame."""
-
-    start: Start
-    tracking: Tracking
-    state: TrackState
+_REMEDIES: dict[Doubted, str] = {
+    "pose": "Look whether the hand covers the points; if not, start with another seed or from a pose file.",
+    "side": "If you know the hand, read it from a hand file and start again.",
+}
 
 
 class State(param.Parameterized):
-    """One page. Views watch its parameters; ``revision`` counts up whenever what was tracked changes."""
+    """One page.
+
+    Views watch its parameters; ``revision`` counts up whenever what was tracked or is shown changes, ``rules`` whenever
+    a tracker, a setting or the set of lanes does.
+    """
 
     session: Session | None = param.ClassSelector(class_=Session, doc="what is tracked")
     frame: int = param.Integer(0, bounds=(0, None), doc="index of the frame shown")
-    origin: Origin | None = param.ClassSelector(class_=Origin, doc="where the run begins; None before Start")
+    origin: Origin | None = param.ClassSelector(class_=Origin, doc="where all lanes begin; None before Start")
     revision: int = param.Integer(0)
 
     init: str = param.Selector(default="auto", objects=list(INITS.values()))
@@ -45,13 +50,15 @@ class State(param.Parameterized):
     hand_file: str = param.String("")
     seed: int = param.Integer(0, bounds=(0, 2**31 - 1))
 
-    tracker: str = param.Selector(default="spf", objects=list(TRACKERS))
-    preset: str = param.Selector(default="default", objects=list(PRESETS))
-    settings: Settings = param.ClassSelector(class_=Settings, default=make_settings("spf"))
+    mode: str = param.Selector(default="one", objects=list(MODES.values()))
+    lanes: tuple[Lane, ...] = param.ClassSelector(class_=tuple, default=())
+    lane: Lane = param.ClassSelector(class_=Lane, doc="the one whose settings are edited, and that is shown alone")
+    rules: int = param.Integer(0)
 
     playing: bool = param.Boolean(False)
     task: str = param.String("", doc="what is being done in the background, or nothing")
     share: float = param.Number(0.0, bounds=(0.0, 1.0), doc="of the task that is done")
+    preparing: str = param.String("", doc="what the server does before it is quick, or nothing")
     error: str = param.String("")
     warning: str = param.String("")
 
@@ -61,39 +68,69 @@ class State(param.Parameterized):
     zoom: float = param.Number(1.0)
 
     def __init__(self, **params: Any) -> None:
-        super().__init__(**params)
-        self.results = Results()
-        # A tracker or preset that was picked brings its own values along.
-        self.param.watch(self._take_preset, ["tracker", "preset"])
+        first = Lane(colour=COLOURS[0])
+        super().__init__(lanes=(first,), lane=first, **params)
+        self._watch_lane(first)
 
-    def _take_preset(self, *_events: Any) -> None:
-        self.settings = make_settings(self.tracker, self.preset)
+    # ---- lanes
 
-    # ---- settings
+    def _watch_lane(self, lane: Lane) -> None:
+        lane.param.watch(self._rules_changed, ["tracker", "preset", "settings"], onlychanged=True)
 
-    def change(self, name: str, value: Any) -> None:
-        """Change one setting from the next step on; a value that is out of range is refused and said so."""
-        try:
-            self.param.update(settings=self.settings.replace(**{name: value}), error="")
-        except SettingError as error:
-            self.error = str(error)
-            self.param.trigger("settings")  # puts the widget back
+    def _rules_changed(self, *_events: Any) -> None:
+        self.rules += 1
 
     @property
-    def differences(self) -> dict[str, tuple[Any, Any]]:
-        """Settings that differ from the preset: name → (preset's value, value)."""
-        preset = make_settings(self.tracker, self.preset).to_dict()
-        return {name: (preset[name], value) for name, value in self.settings.to_dict().items() if value != preset[name]}
+    def active(self) -> tuple[Lane, ...]:
+        """The lanes that are shown, and that a step takes on."""
+        return self.lanes if self.mode == "compare" else (self.lane,)
 
-    def back_to_preset(self) -> None:
-        """Undo every change of a setting."""
-        self._take_preset()
+    def add_lane(self) -> None:
+        """Add a lane with the first tracker that none has yet; at most as many as there are colours."""
+        if len(self.lanes) == len(COLOURS):
+            return
+        taken = {lane.tracker for lane in self.lanes}
+        tracker = next((name for name in TRACKERS if name not in taken), self.lane.tracker)
+        colour = next(c for c in COLOURS if c not in {lane.colour for lane in self.lanes})
+        lane = Lane(tracker, colour)
+        self._watch_lane(lane)
+        self.param.update(
+            lanes=(*self.lanes, lane), lane=lane, rules=self.rules + 1, revision=self.revision + 1,
+        )  # fmt: skip
+
+    def remove_lane(self, lane: Lane) -> None:
+        """Remove a lane; two are the least to compare."""
+        if len(self.lanes) <= 2:
+            return
+        left = tuple(other for other in self.lanes if other is not lane)
+        chosen = left[0] if self.lane is lane else self.lane
+        self.param.update(lanes=left, lane=chosen, rules=self.rules + 1, revision=self.revision + 1)
+
+    def choose(self, lane: Lane) -> None:
+        """Edit a lane's settings from now on, and show it when one is shown alone."""
+        self.param.update(lane=lane, rules=self.rules + 1, revision=self.revision + 1)
+
+    def show_mode(self, mode: str) -> None:
+        """Show one tracker, or compare at least two."""
+        if mode == "compare" and len(self.lanes) < 2:
+            self.add_lane()
+        self.param.update(mode=mode, revision=self.revision + 1)
+
+    def change(self, name: str, value: Any) -> None:
+        """Change one setting of the chosen lane from the next step on; one that is out of range is refused and said so."""
+        try:
+            self.lane.change(name, value)
+            self.error = ""
+        except SettingError as error:
+            self.error = str(error)
+            self.rules += 1  # puts the widget back
 
     # ---- the run
 
     def load(self, session: Session) -> None:
         """Show a session from its first frame, with nothing tracked."""
-        self.results = Results()
+        for lane in self.lanes:
+            lane.clear()
         init = "auto" if self.init == "truth" and not session.has_truth else self.init
         self.param.update(
             session=session, frame=0, origin=None, init=init, error="", warning="", playing=False,
@@ -101,11 +138,21 @@ class State(param.Parameterized):
         )  # fmt: skip
 
     def begin(self, origin: Origin) -> None:
-        """Begin a run; what the last one tracked is dropped."""
-        self.results = Results()
+        """Begin anew; what was tracked from another start is dropped."""
+        for lane in self.lanes:
+            lane.clear()
+        start = origin.start
+        warning = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
         self.param.update(
-            origin=origin, frame=origin.start.frame, error="", warning=origin.start.doubt, revision=self.revision + 1
-        )
+            origin=origin, frame=start.frame, error="", warning=warning, revision=self.revision + 1
+        )  # fmt: skip
+
+    def rewind(self) -> None:
+        """Go back to the first frame of the run; what the lanes shown have tracked is dropped."""
+        assert self.origin is not None
+        for lane in self.active:
+            lane.clear()
+        self.show(self.origin.start.frame)
 
     def show(self, frame: int) -> None:
         """Show a frame, and what was tracked in it."""
@@ -118,35 +165,35 @@ class State(param.Parameterized):
 
     @property
     def entry(self) -> Entry | None:
-        """Everything of the frame shown, or None when it was not tracked or is no longer in memory."""
-        return self.results.entry(self.frame)
+        """Everything of the frame shown in the chosen lane, or None when it was not tracked or is no longer in memory."""
+        return self.lane.entry(self.frame)
 
     @property
     def summary(self) -> Summary | None:
-        """Of the frame shown, or None when it was not tracked."""
-        return self.results.summary(self.frame)
+        """Of the frame shown in the chosen lane, or None when it was not tracked."""
+        return self.lane.summary(self.frame)
+
+    @property
+    def last(self) -> int | None:
+        """The last frame that every lane shown has tracked; None when there is none."""
+        lasts = [lane.results.last for lane in self.active]
+        known = [last for last in lasts if last is not None]
+        return min(known) if len(known) == len(lasts) else None
+
+    @property
+    def is_tracked(self) -> bool:
+        """Whether every lane shown has tracked the frame shown."""
+        return all(lane.summary(self.frame) is not None for lane in self.active)
 
     @property
     def next_frame(self) -> int | None:
-        """Return the frame that a step leads to; None before Start and at the end of the session."""
+        """The frame that a step leads to; None before Start and at the end of the session."""
         if self.session is None or self.origin is None:
             return None
-        last = self.results.last
-        if last is None:
+        if self.last is None:
             return self.origin.start.frame
-        following = (self.frame if self.summary is not None else last) + 1
+        following = (self.frame if self.is_tracked else self.last) + 1
         return following if following < len(self.session) else None
-
-    def is_current(self, frame: int) -> bool:
-        """Tell whether a frame's stored result is what a step with the present settings may show again."""
-        entry = self.results.entry(frame)
-        return entry is not None and same_rules(entry.tracking, self.tracker, self.settings)
-
-    @property
-    def loss(self) -> str:
-        """Return one sentence while the hand is lost in the frame shown, else nothing."""
-        since = self.results.lost_since(self.frame)
-        return "" if since is None else f"Hand lost at frame {since}: searching"
 
     # ---- the view of the 3-D pictures
 

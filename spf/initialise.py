@@ -8,7 +8,7 @@ on explaining the depth wins. A wrong side or size may explain one frame, but se
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +28,11 @@ from spf.observation import Observation, observe
 from spf.search import SearchSettings, size_penalty
 from spf.segmentation import find_regions
 
-__all__ = ["Start", "find_start"]
+__all__ = ["Doubted", "Start", "find_start"]
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
+Doubted = Literal["pose", "side"]
 
 DOUBTFUL = 0.42  # mean golden energy over the validation above which a start is not believed
 _SIDES: tuple[Side, Side] = ("right", "left")
@@ -68,19 +69,21 @@ class Start(NamedTuple):
     margin: float
 
     @property
+    def doubted(self) -> Doubted | None:
+        """What of the start may be wrong; an interface says by it what to do."""
+        if self.golden > DOUBTFUL:
+            return "pose"
+        return "side" if self.margin < 0.01 else None
+
+    @property
     def doubt(self) -> str:
         """One sentence why the start may be wrong, or ""."""
-        if self.golden > DOUBTFUL:
-            return (
-                f"The first pose may be wrong (its render explains the depth poorly, {self.golden:.2f}): "
-                "give one with --init POSE.json, or begin at a frame that shows an open hand."
-            )
-        if self.margin < 0.01:
-            return (
-                f"The side may be wrong: a {self.shape.side} hand explains the depth hardly better than the other; "
-                "give the hand with --hand HAND.json if you know it."
-            )
-        return ""
+        sentences: dict[Doubted | None, str] = {
+            "pose": f"The first pose may be wrong: its render explains the depth poorly, {self.golden:.2f}.",
+            "side": f"The side may be wrong: a {self.shape.side} hand explains the depth hardly better than the other.",
+            None: "",
+        }
+        return sentences[self.doubted]
 
 
 class _Hypothesis(NamedTuple):

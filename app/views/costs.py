@@ -34,8 +34,8 @@ class Costs(Plot):
         before = np.empty(0) if info is None else info.cost_before
         after = np.empty(0) if info is None else info.cost_after
         if not len(after):  # a filter that optimises nothing
-            after = before
+            after = np.full(len(before), np.nan)
         self.source.data = {"particle": np.arange(1, len(before) + 1), "before": before, "after": after}
         if len(before):
-            self.figure.y_range.update(start=0, end=1.1 * float(max(before.max(), after.max())))
+            self.figure.y_range.update(start=0, end=1.1 * float(np.nanmax([*before, *after])))
             self.figure.x_range.update(start=0.4, end=len(before) + 0.6)

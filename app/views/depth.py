@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.results import Seen
 from app.state import State
 from app.views.picture import Picture
 from spf.errors import SessionError
 from spf.frame import Camera, Frame
-from spf.observation import Observation
 from spf.render.palette import PREDICTED
 
 __all__ = ["Depth", "depth_picture"]
 
+Colour = tuple[int, ...]  # RGB, 0 to 255
 _WIDTH = 736  # pixels, twice what it takes in the page
 _BONES = tuple((0 if i % 4 == 1 else i - 1, i) for i in range(1, 21))
 _ESTIMATE, _OUTLINE = (255, 255, 255), (25, 25, 25)  # RGB
@@ -25,10 +27,10 @@ _BACKGROUND = (42, 48, 56)
 
 
 class Depth:
-    """The pane."""
+    """The pane, with the skeleton of every lane shown."""
 
-    def __init__(self, state: State) -> None:
-        self._state = state
+    def __init__(self, state: State, mode: str = "one") -> None:
+        self._state, self._mode = state, mode
         self.pane = Picture(
             hint="Choose a session to see its depth images.", alt="Depth image", sizing_mode="stretch_both", margin=0
         )
@@ -37,50 +39,54 @@ class Depth:
     def draw(self, *_events: Any) -> None:
         """Draw the frame shown."""
         state = self._state
-        if state.session is None:
+        if state.session is None or state.mode != self._mode:
             return
         try:
             frame = state.session[state.frame]
         except SessionError as error:
             state.error = str(error)
             return
-        observation = state.entry.result.observation if state.entry is not None else None
-        joints = state.summary.joints if state.summary is not None and not state.summary.lost else None
-        truth = frame.truth.joints if state.with_truth and frame.truth is not None else None
-        self.pane.image = depth_picture(frame, observation, joints, truth)
+        seen = state.entry.seen if state.entry is not None else None
+        skeletons = [(frame.truth.joints, _TRUTH)] if state.with_truth and frame.truth is not None else []
+        for lane in state.active:
+            summary = lane.summary(state.frame)
+            if summary is not None and not summary.lost:
+                skeletons.append((summary.joints, _ESTIMATE if self._mode == "one" else _rgb(lane.colour)))
+        self.pane.image = depth_picture(frame, seen, skeletons)
 
 
 def depth_picture(
     frame: Frame,
-    observation: Observation | None = None,
-    joints: NDArray[np.float64] | None = None,
-    truth: NDArray[np.float64] | None = None,
+    seen: Seen | None = None,
+    skeletons: Sequence[tuple[NDArray[np.float64], Colour]] = (),
 ) -> bytes:
     """Return a JPEG file of a frame.
 
     Args:
         frame: the depth image.
-        observation: what the tracker took for the hand: in colour, all else in grey; None colours everything.
-        joints: (21, 3) m of the estimate, or None.
-        truth: (21, 3) m, NaN where unknown, or None.
+        seen: what the tracker took for the hand: in colour, all else in grey; None colours everything.
+        skeletons: (joints (21, 3) m, NaN where unknown; colour) of each, the later over the earlier.
     """
     scale = _WIDTH / frame.depth.shape[1]
-    rgb = _coloured(frame.depth, None if observation is None else _region(frame, observation))
+    rgb = _coloured(frame.depth, None if seen is None else _region(frame, seen))
     size = (_WIDTH, round(frame.depth.shape[0] * scale))
     canvas = np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_NEAREST), dtype=np.uint8)
-    if truth is not None:
-        _skeleton(canvas, frame.camera, truth, scale, _TRUTH)
-    if joints is not None:
-        _skeleton(canvas, frame.camera, joints, scale, _ESTIMATE)
+    for joints, colour in skeletons:
+        _skeleton(canvas, frame.camera, joints, scale, colour)
     _, encoded = cv2.imencode(".jpg", canvas[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 90])
     return bytes(encoded)
 
 
-def _region(frame: Frame, observation: Observation) -> NDArray[np.bool_]:
+def _rgb(css: str) -> Colour:
+    """A colour ``#rrggbb`` as numbers, lightened so that it stands out from the picture."""
+    red, green, blue = (int(css[at : at + 2], 16) for at in (1, 3, 5))
+    return tuple(round(0.75 * part + 0.25 * 255) for part in (red, green, blue))
+
+
+def _region(frame: Frame, seen: Seen) -> NDArray[np.bool_]:
     region = np.zeros(frame.depth.shape, bool)
-    height, width = observation.depth.shape
-    top, left = observation.top, observation.left
-    region[top : top + height, left : left + width] = observation.depth > 0
+    height, width = seen.mask.shape
+    region[seen.top : seen.top + height, seen.left : seen.left + width] = seen.mask
     return region
 
 
@@ -111,7 +117,7 @@ def _cividis(depth: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.
 
 
 def _skeleton(
-    canvas: NDArray[np.uint8], camera: Camera, joints: NDArray[np.float64], scale: float, colour: tuple[int, ...]
+    canvas: NDArray[np.uint8], camera: Camera, joints: NDArray[np.float64], scale: float, colour: Colour
 ) -> None:
     """Draw bones and joints over a picture enlarged by ``scale``, with an outline that stands out from any colour."""
     fraction = 4  # bits of a pixel's fraction that OpenCV takes

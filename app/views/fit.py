@@ -31,7 +31,7 @@ class Fit(FramePlot):
 
     def draw_frames(self) -> None:
         """Show the frames tracked so far."""
-        summaries = self.state.results.summaries
+        summaries = self.state.lane.results.summaries
         self.source.data = {
             "frame": [s.frame for s in summaries],
             "golden": [s.golden for s in summaries],

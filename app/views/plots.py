@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from typing import Any
 
 import panel as pn
@@ -11,11 +10,12 @@ from bokeh.models import Span
 from bokeh.plotting import figure
 
 from app.state import State
+from app.views.follower import Follower
 from spf.render.palette import OPTIMISED, PREDICTED, RESIDUAL
 
 __all__ = ["AFTER", "BEFORE", "CALM", "LOSS", "FramePlot", "Plot", "calm_figure", "css", "heading"]
 
-_EVERY = 0.4  # s between two redraws while playing
+_LEAST_FRAMES, _ROOM = 30, 1.25  # that the axis of frames shows at least, and of what is tracked
 
 
 def css(colour: tuple[float, float, float]) -> str:
@@ -55,45 +55,32 @@ def heading(title: str, *keys: tuple[str, str, str]) -> str:
     )
 
 
-class Plot(ABC):
+class Plot(Follower):
     """A pane that follows the state, under a heading."""
 
-    def __init__(self, state: State, plot: figure, title: str) -> None:
-        self.state, self.figure = state, plot
+    def __init__(self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = ()) -> None:
+        super().__init__(state, mode, also)
+        self.figure = plot
         self.heading = pn.pane.HTML(title, margin=(2, 4), sizing_mode="stretch_width")
         self.pane = pn.pane.Bokeh(plot, sizing_mode="stretch_both", margin=0)
-        self._drawn = 0.0
-        state.param.watch(self._follow, ["revision", "playing"])
-
-    def _follow(self, *_events: Any) -> None:
-        now = time.monotonic()
-        if self.state.playing and now - self._drawn < _EVERY:
-            return  # the next frame comes soon, and the end of playing redraws in any case
-        self._drawn = now
-        document = pn.state.curdoc
-        if document is None or document.session_context is None:
-            self.draw()
-        else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
-            document.add_next_tick_callback(self.draw)
-
-    @abstractmethod
-    def draw(self) -> None:
-        """Replace the data by what the state shows."""
 
 
 class FramePlot(Plot):
     """A plot over the frames of the session, with a line at the one shown."""
 
-    def __init__(self, state: State, plot: figure, title: str) -> None:
-        super().__init__(state, plot, title)
+    def __init__(self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = ()) -> None:
+        super().__init__(state, plot, title, mode, also)
         self._here = Span(location=0, dimension="height", line_color="#9aa4ae", line_width=1)
         plot.add_layout(self._here)
 
     def draw(self) -> None:
         """Replace the data and move the line."""
-        self._here.location = self.state.frame
-        if self.state.session is not None:
-            self.figure.x_range.update(start=-1, end=len(self.state.session))
+        state = self.state
+        self._here.location = state.frame
+        if state.session is not None:
+            furthest = max([state.frame, *(lane.results.last or 0 for lane in state.active)])
+            end = min(len(state.session), max(_LEAST_FRAMES, _ROOM * furthest))
+            self.figure.x_range.update(start=-0.02 * end, end=end)
         self.draw_frames()
 
     @abstractmethod

@@ -1,21 +1,23 @@
-"""Tracked frame → the scenes of the three pictures (Fig. 6, Fig. 9)."""
+"""Tracked frame → the scenes of the pictures (Fig. 6, Fig. 9), and where they are seen from."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.results import Entry
 from spf.hand.kinematics import joints_of, pose_hand
-from spf.hand.model import Hand
-from spf.render import Scene, ViewCamera, particles_scene, reconstruction_scene, trajectories_scene
+from spf.render import Colour, Scene, ViewCamera, particles_scene, reconstruction_scene, trajectories_scene
+from spf.render.palette import HAND
 
-__all__ = ["PICTURES", "scenes_of", "view_of"]
+__all__ = ["PICTURES", "SCENES", "particles_of", "reconstruction_of", "trajectories_of", "view_of"]
 
-#: Name → heading of each picture.
+#: Name → heading of each picture of one tracker.
 PICTURES = {
     "particles": "Particles before and after optimisation",
-    "trajectories": "Trajectories of SMD",
+    "trajectories": "Trajectories of optimisation",
     "reconstruction": "Reconstructed hand",
 }
 
@@ -24,23 +26,20 @@ _MOST_PATHS = 16  # particles whose paths are drawn
 _PATH_JOINTS = np.array([0, 4, 8, 12, 16, 20])  # wrist and fingertips
 
 
-def scenes_of(entry: Entry) -> dict[str, Scene]:
-    """Return name → scene of a frame; empty while the hand is lost."""
-    result, hand = entry.result, entry.tracking.hand
-    if result.info is None or result.observation is None:
-        return {}
-    points = result.observation.hand_points
-    estimate = pose_hand(hand, result.info.estimate, result.info.reference).vertices
-    return {
-        "particles": _particles(entry, hand, points),
-        "trajectories": _trajectories(entry, hand, points),
-        "reconstruction": reconstruction_scene(estimate, hand.faces, points=points),
-    }
+def reconstruction_of(entry: Entry, colour: Colour = HAND) -> Scene | None:
+    """Return the estimated hand among the observed points; None while it is lost."""
+    info, hand = entry.result.info, entry.tracking.hand
+    if info is None or entry.seen is None:
+        return None
+    vertices = pose_hand(hand, info.estimate, info.reference).vertices
+    return reconstruction_scene(vertices, hand.faces, points=entry.seen.points, colour=colour)
 
 
-def _particles(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
-    info = entry.result.info
-    assert info is not None
+def particles_of(entry: Entry) -> Scene | None:
+    """Return the heaviest particles before and after optimisation, as hands; None while the hand is lost."""
+    info, seen, hand = entry.result.info, entry.seen, entry.tracking.hand
+    if info is None or seen is None:
+        return None
     before, after = info.predicted_weights, info.optimised_weights
     heaviest = np.maximum(before, after) if len(after) else before
     drawn = np.argsort(-heaviest, kind="stable")[:_MOST_HANDS]
@@ -48,6 +47,7 @@ def _particles(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
     def vertices(poses: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.stack([pose_hand(hand, pose, info.reference).vertices for pose in poses[drawn]])
 
+    points = seen.points
     if not len(after):  # a filter that optimises nothing
         return particles_scene(
             vertices(info.predicted), None, hand.faces,
@@ -59,22 +59,33 @@ def _particles(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
     )  # fmt: skip
 
 
-def _trajectories(entry: Entry, hand: Hand, points: NDArray[np.float64]) -> Scene:
-    info = entry.result.info
-    assert info is not None
+def trajectories_of(entry: Entry) -> Scene | None:
+    """Return the paths of wrist and fingertips during optimisation; None when none were recorded."""
+    info, seen, hand = entry.result.info, entry.seen, entry.tracking.hand
+    if info is None or seen is None or not info.trajectories:
+        return None
     after = info.optimised_weights
     drawn = np.argsort(-after, kind="stable")[:_MOST_PATHS]
     traces = [info.trajectories[index] for index in drawn]
-    longest = max((len(trace.poses) for trace in traces), default=1)
+    longest = max(len(trace.poses) for trace in traces)
     paths = np.empty((len(traces), longest, len(_PATH_JOINTS), 3))
     for path, trace in zip(paths, traces, strict=True):
         for i in range(longest):  # a particle that converged early stays where it is
             path[i] = joints_of(hand, trace.poses[min(i, len(trace.poses) - 1)], info.reference)[_PATH_JOINTS]
-    return trajectories_scene(paths, weights=after[drawn], points=points)
+    return trajectories_scene(paths, weights=after[drawn], points=seen.points)
 
 
-def view_of(entry: Entry, azimuth: float, elevation: float, zoom: float) -> ViewCamera:
-    """Return the sensor's view of the estimated hand, orbited by angles in radians and magnified."""
-    view = ViewCamera.from_sensor(entry.result.joints)
+#: Name → scene of each picture of one tracker.
+SCENES: dict[str, Callable[[Entry], Scene | None]] = {
+    "particles": particles_of,
+    "trajectories": trajectories_of,
+    "reconstruction": reconstruction_of,
+}
+
+
+def view_of(entries: Iterable[Entry], azimuth: float, elevation: float, zoom: float) -> ViewCamera:
+    """Return the sensor's view of the hand that explains the depth best, orbited by angles in radians and magnified."""
+    best = min(entries, key=lambda entry: np.nan_to_num(entry.result.golden, nan=np.inf))
+    view = ViewCamera.from_sensor(best.result.joints)
     # The skin reaches beyond the joints, and the particles beyond the estimate.
     return view._replace(extent=1.25 * view.extent, azimuth=azimuth, elevation=elevation, zoom=zoom)

@@ -67,7 +67,7 @@ class SessionCard:
         except SessionError as error:
             self._state.error = str(error)
             return
-        await self._open(str(path), "")
+        await self._open(str(path), self._camera.value_input or self._camera.value)
 
     def _describe(self, event: Any) -> None:
         session: Session = event.new

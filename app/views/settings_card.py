@@ -1,7 +1,8 @@
-"""Tracker, preset and settings: four sliders, everything else folded away, and what differs from the preset."""
+"""Tracker, preset and settings of the chosen lane: four sliders, all else folded away, and what differs from the preset."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -25,68 +26,83 @@ SLIDERS: dict[str, tuple[str, float, float, float]] = {
 
 
 class SettingsCard:
-    """The card."""
+    """The card; its fields are those that the tracker declares."""
 
     def __init__(self, state: State) -> None:
         self._state = state
-        tracker = pmu.Select.from_param(
-            state.param.tracker, label="Tracker", options={t.title: t.name for t in TRACKERS.values()}, size="small",
-            sizing_mode="stretch_width",
-        )  # fmt: skip
-        preset = pmu.Select.from_param(
-            state.param.preset, label="Preset", options=list(PRESETS), size="small", width=120
-        )
-        self._infos = {info.name: info for row in TRACKERS.values() for info in row.settings.describe()}
-        self._widgets: dict[str, Any] = {}
-        for name in SLIDERS:
-            self._add(name, _slider(self._infos[name]))
+        options: dict[str, Any] = {"size": "small", "sizing_mode": "stretch_width"}
+        self._tracker = pmu.Select(label="Tracker", options={t.title: t.name for t in TRACKERS.values()}, **options)
+        self._preset = pmu.Select(label="Preset", options=list(PRESETS), **options)
+        self._infos: dict[str, SettingInfo] = {}
+        self._fields: dict[str, Any] = {}
+        self._made_for = ""
+        self._sliders = pmu.Column(sizing_mode="stretch_width", margin=0)
+        self._others = pmu.Column(sizing_mode="stretch_width", margin=0)
+        self._unfolded = False
         self._hint = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
         self._back = pmu.Button(
             label="Back to the preset", icon="undo", variant="text", size="small", visible=False,
-            on_click=lambda _event: state.back_to_preset(), margin=(0, 4),
+            on_click=lambda _event: state.lane.back_to_preset(), margin=(0, 4),
         )  # fmt: skip
-        state.param.watch(self._follow, "settings")
+        self._tracker.param.watch(self._picked("tracker"), "value")
+        self._preset.param.watch(self._picked("preset"), "value")
+        state.param.watch(self._follow, ["rules", "lane"])
         self._follow()
         self.panel = pmu.Column(
-            pmu.Row(tracker, preset, sizing_mode="stretch_width"), *(self._widgets[name] for name in SLIDERS),
-            self._hint, self._back, folded("All other settings", self._others), sizing_mode="stretch_width",
+            self._tracker, self._preset, self._sliders, self._hint, self._back,
+            folded("All other settings", self._unfold), sizing_mode="stretch_width",
         )  # fmt: skip
 
-    def _add(self, name: str, widget: Any) -> Any:
-        self._widgets[name] = widget
-        widget.param.watch(partial(self._changed, name), "value")
-        return widget
+    def _picked(self, name: str) -> Callable[[Any], None]:
+        return lambda event: setattr(self._state.lane, name, event.new)
 
-    def _others(self) -> list[Any]:
-        """Return the fields of all other settings, under the headings of their groups."""
+    def _unfold(self) -> list[Any]:
+        self._unfolded = True
+        self._make()
+        return [self._others]
+
+    def _make(self) -> None:
+        """Make the fields of the chosen tracker's settings, those that are folded away only once they were asked for."""
+        lane = self._state.lane
+        infos = self._infos = {info.name: info for info in lane.settings.describe()}
+        values = lane.settings.to_dict()
+        self._made_for, self._fields = lane.tracker, {}
+        self._sliders.objects = [
+            self._add(name, _slider(infos[name], values[name])) for name in SLIDERS if name in infos
+        ]
         groups: dict[str, list[Any]] = {}
-        for name, info in self._infos.items():
-            if name not in SLIDERS:
-                groups.setdefault(info.group, []).append(self._add(name, _field(info)))
-        self._follow()
-        return [
+        for name, info in infos.items():
+            if self._unfolded and name not in SLIDERS:
+                groups.setdefault(info.group, []).append(self._add(name, _field(info, values[name])))
+        self._others.objects = [
             part
-            for group, widgets in groups.items()
-            for part in (pmu.Typography(group, variant="subtitle2", margin=(8, 10, 0, 10)), *widgets)
+            for group, fields in groups.items()
+            for part in (pmu.Typography(group, variant="subtitle2", margin=(8, 10, 0, 10)), *fields)
         ]
 
+    def _add(self, name: str, field: Any) -> Any:
+        self._fields[name] = field
+        field.param.watch(partial(self._changed, name), "value")
+        return field
+
     def _changed(self, name: str, event: Any) -> None:
-        value = event.new
-        if value is None or not hasattr(self._state.settings, name) or value == getattr(self._state.settings, name):
-            return
-        self._state.change(name, value)
+        settings = self._state.lane.settings
+        if event.obj is not self._fields.get(name) or event.new is None or event.new == getattr(settings, name):
+            return  # a field of another tracker, or one that follows
+        self._state.change(name, event.new)
 
     def _follow(self, *_events: Any) -> None:
-        settings = self._state.settings
-        values = settings.to_dict()
-        for name, widget in self._widgets.items():
-            widget.disabled = name not in values
-            if name in values and widget.value != values[name]:
-                if name in SLIDERS:  # a preset may lie outside the usual part
-                    _, least, most, _ = SLIDERS[name]
-                    widget.param.update(start=min(least, values[name]), end=max(most, values[name]))
-                widget.value = values[name]
-        changed = self._state.differences
+        lane = self._state.lane
+        self._tracker.value, self._preset.value = lane.tracker, lane.preset
+        if self._made_for != lane.tracker:
+            self._make()
+        values = lane.settings.to_dict()
+        for name, field in self._fields.items():
+            if field.value != values[name]:
+                if name in SLIDERS:
+                    field.param.update(**_ends(self._infos[name], values[name]))
+                field.value = values[name]
+        changed = lane.differences
         self._back.visible = bool(changed)
         words = ", ".join(f"{name} {_short(was)} → {_short(now)}" for name, (was, now) in changed.items())
         style = "font:12px/1.4 Roboto,sans-serif;color:"
@@ -107,30 +123,35 @@ def _label(info: SettingInfo) -> str:
     return f"{name}, {info.unit}" if info.unit else name
 
 
-def _slider(info: SettingInfo) -> Any:
-    heading, least, most, step = SLIDERS[info.name]
+def _ends(info: SettingInfo, value: float) -> dict[str, float]:
+    """Ends of a slider: the usual part of the range, widened for a tracker that wants more, and to hold the value."""
+    _, least, most, _ = SLIDERS[info.name]
+    high = most if info.default <= most else 2 * info.default
+    low, high = min(least, value), max(high, value)
+    return {
+        "start": info.kind(low if info.low is None else max(low, info.low)),
+        "end": info.kind(high if info.high is None else min(high, info.high)),
+    }
+
+
+def _slider(info: SettingInfo, value: Any) -> Any:
+    heading, _, _, step = SLIDERS[info.name]
     kind = pmu.IntSlider if info.kind is int else pmu.FloatSlider
     unit = f", {info.unit}" if info.unit else ""
     return kind(
-        label=f"{info.symbol} · {heading}{unit}", value=info.default, start=info.kind(least), end=info.kind(most),
-        step=info.kind(step), description=info.meaning, size="small",
-        sizing_mode="stretch_width", margin=(4, 16, 0, 12),
+        label=f"{info.symbol or info.name} · {heading}{unit}", value=value, step=info.kind(step),
+        description=info.meaning, size="small", sizing_mode="stretch_width", margin=(4, 16, 0, 12), **_ends(info, value),
     )  # fmt: skip
 
 
-def _field(info: SettingInfo) -> Any:
-    label, about = _label(info), info.meaning
+def _field(info: SettingInfo, value: Any) -> Any:
+    options: dict[str, Any] = {
+        "label": _label(info), "value": value, "description": info.meaning, "size": "small",
+        "sizing_mode": "stretch_width",
+    }  # fmt: skip
     if info.kind is bool:
-        return pmu.Checkbox(
-            label=label, value=info.default, description=about, size="small", sizing_mode="stretch_width"
-        )
+        return pmu.Checkbox(**options)
     if info.kind is str:
-        return pmu.Select(
-            label=label, value=info.default, options=list(info.choices), description=about, size="small",
-            sizing_mode="stretch_width",
-        )  # fmt: skip
+        return pmu.Select(options=list(info.choices), **options)
     kind = pmu.IntInput if info.kind is int else pmu.FloatInput
-    return kind(
-        label=label, value=info.default, start=info.low, end=info.high, description=about, size="small",
-        sizing_mode="stretch_width",
-    )  # fmt: skip
+    return kind(start=info.low, end=info.high, **options)

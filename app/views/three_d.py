@@ -1,18 +1,20 @@
-"""The three off-screen pictures under one view: quick ones while something moves, a sharp one when it has settled."""
+"""Off-screen pictures under one view: quick ones while something moves, sharp ones when it has settled."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from typing import Any
 
 import panel as pn
 
+from app.lane import Lane
 from app.results import Entry
 from app.state import State
 from app.views.picture import Picture
-from app.views.scenes import PICTURES, scenes_of, view_of
+from app.views.scenes import view_of
 from spf.errors import RenderError, RenderUnavailableError
 from spf.render import Renderer, Scene
 
@@ -25,27 +27,46 @@ _log = logging.getLogger(__name__)
 
 
 class ThreeD:
-    """Draws what the state shows whenever it changes; the newest wins, and one drawing is in flight."""
+    """Draws what the state shows whenever it changes; the newest wins, and one drawing is in flight.
 
-    def __init__(self, state: State, renderer: Renderer) -> None:
-        self._state, self._renderer = state, renderer
+    Args:
+        state: of the page.
+        renderer: of the server.
+        mode: of the page that the pictures are seen in.
+        names: name of each picture → what it shows, for who cannot see it.
+        lanes: returns the lane that each picture shows; a name without one is a picture that shows nothing.
+        scene: makes the scene of a picture, None when there is nothing to draw.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        renderer: Renderer,
+        mode: str,
+        names: dict[str, str],
+        lanes: Callable[[], dict[str, Lane]],
+        scene: Callable[[str, Entry], Scene | None],
+    ) -> None:
+        self._state, self._renderer, self._mode, self._lanes, self._scene = state, renderer, mode, lanes, scene
         self.panes = {
             name: Picture(
                 on_shown=self._on_shown, on_orbit=self._on_orbit, on_reset=state.reset_view,
-                alt=heading, sizing_mode="stretch_both", margin=0,
+                alt=alt, sizing_mode="stretch_both", margin=0,
             )
-            for name, heading in PICTURES.items()
+            for name, alt in names.items()
         }  # fmt: skip
-        self._scenes: tuple[Entry | None, dict[str, Scene]] = (None, {})
+        self._made: dict[str, tuple[Entry, Scene | None]] = {}
         self._wanted = False
         self._moved = 0.0
         self._drawing: asyncio.Task[None] | None = None
         self._awaited = 0  # pictures sent to the browser that it has not shown yet
         self._all_shown = asyncio.Event()
-        state.param.watch(self.request, ["revision", "task", "azimuth", "elevation", "zoom", "playing"])
+        state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
 
     def request(self, *_events: Any) -> None:
         """Have the present state drawn soon."""
+        if self._state.mode != self._mode:
+            return
         self._wanted = True
         if self._drawing is None or self._drawing.done():
             self._drawing = asyncio.get_running_loop().create_task(self._draw_until_settled())
@@ -82,7 +103,8 @@ class ThreeD:
                     return
                 await asyncio.sleep(_SETTLED)
         except RenderUnavailableError as error:
-            self._blank(str(error))
+            for pane in self.panes.values():
+                pane.param.update(image=b"", hint=str(error))
         except RenderError as error:
             self._state.error = str(error)
         except Exception:
@@ -90,19 +112,21 @@ class ThreeD:
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
 
     async def _draw(self, *, sharp: bool) -> None:
-        state, entry = self._state, self._state.entry
-        if entry is None or entry.result.info is None:
-            self._blank(self._hint())
+        state, lanes = self._state, self._lanes()
+        entries = {name: entry for name, lane in lanes.items() if (entry := lane.entry(state.frame)) is not None}
+        scenes = await self._scenes(entries)
+        for name, lane in lanes.items():
+            if name not in scenes:
+                self.panes[name].param.update(image=b"", hint=self._hint(lane))
+        if not scenes:
             return
-        if self._scenes[0] is not entry:
-            self._scenes = (entry, await asyncio.get_running_loop().run_in_executor(None, scenes_of, entry))
-        view = view_of(entry, state.azimuth, state.elevation, state.zoom)
+        view = view_of((entries[name] for name in scenes), state.azimuth, state.elevation, state.zoom)
         size, quality = (_SHARP, 92) if sharp else (_QUICK, 80)
         futures = {
             name: asyncio.wrap_future(
                 self._renderer.submit(scene, view, size, encoding="jpeg", quality=quality, smooth=sharp)
             )
-            for name, scene in self._scenes[1].items()
+            for name, scene in scenes.items()
         }
         pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
         self._all_shown.clear()
@@ -111,18 +135,31 @@ class ThreeD:
             for name, picture in pictures.items():
                 self.panes[name].image = picture
 
-    def _blank(self, hint: str) -> None:
-        for pane in self.panes.values():
-            pane.param.update(image=b"", hint=hint)
+    async def _scenes(self, entries: dict[str, Entry]) -> dict[str, Scene]:
+        """The scenes of entries, made beside the event loop unless they were drawn last."""
+        loop = asyncio.get_running_loop()
+        made: dict[str, tuple[Entry, Scene | None]] = {}
+        for name, entry in entries.items():
+            last = self._made.get(name)
+            if last is not None and last[0] is entry:
+                made[name] = last
+            else:
+                made[name] = entry, await loop.run_in_executor(None, self._scene, name, entry)
+        self._made = made
+        return {name: scene for name, (_, scene) in made.items() if scene is not None}
 
-    def _hint(self) -> str:
-        state = self._state
-        if state.loss:
-            return state.loss
-        if state.task and state.summary is None:
-            return f"{state.task} …"
+    def _hint(self, lane: Lane) -> str:
+        """What is said in place of a picture."""
+        state, summary = self._state, lane.summary(self._state.frame)
+        if lane.loss(state.frame):
+            return lane.loss(state.frame)
+        if summary is None and (state.task or state.preparing):
+            return f"{state.task or state.preparing} …"
         if state.origin is None:
-            return "Press Start: the particles of each frame are drawn here."
-        if state.summary is not None:
+            return "Press Start: each tracked frame is drawn here."
+        entry = lane.entry(state.frame)
+        if entry is not None:
+            return "This tracker keeps no trajectories." if entry.result.info is not None else "Nothing to draw."
+        if summary is not None:
             return "The particles of this frame are no longer in memory; its results are in the plots."
         return "This frame is not tracked yet: step, play or jump further."

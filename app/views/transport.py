@@ -32,10 +32,12 @@ class Transport:
             label="", show_value=False, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
             sizing_mode="stretch_width", margin=(8, 18), size="small",
         )  # fmt: skip
-        self._count = pn.pane.HTML("", width=250, margin=(12, 8), align="center")
+        self._count = pn.pane.HTML("", width=290, margin=(12, 8), align="center")
         self._rearm()
         self._slider.param.watch(self._on_slide, "value_throttled")
-        state.param.watch(self._follow, ["session", "frame", "revision", "task", "playing", "origin"])
+        state.param.watch(
+            self._follow, ["session", "frame", "revision", "task", "playing", "origin", "mode", "lanes", "lane"]
+        )
         self._follow()
         self.panel = pmu.Row(
             self._restart, self._step, self._play, self._slider, self._count, sizing_mode="stretch_width"
@@ -77,10 +79,13 @@ class Transport:
         if state.session is None:
             return
         self._slider.param.update(end=max(len(state.session) - 1, 1), value=state.frame, disabled=False)
-        summary, last = state.summary, state.results.last
+        last = state.last
+        summaries = [lane.summary(state.frame) for lane in state.active]
         tracked = "not tracked" if last is None else f"tracked to {last}"
-        took = "" if summary is None else f" · {1000 * summary.seconds:.0f} ms"
+        took = f" · {1000 * sum(s.seconds for s in summaries if s is not None):.0f} ms" if any(summaries) else ""
+        lost = state.lane.loss(state.frame) if state.mode == "one" else ""
+        what = f"<span style='color:#b33c00;font-weight:500'>{lost}</span>" if lost else f"{tracked}{took}"
         self._count.object = (
             "<div style='font:13px/1.3 Roboto,sans-serif;color:#2a3038;font-variant-numeric:tabular-nums'>"
-            f"<b>Frame {state.frame}</b> of {len(state.session) - 1} · {tracked}{took}</div>"
+            f"<b>Frame {state.frame}</b> of {len(state.session) - 1} · {what}</div>"
         )

@@ -57,11 +57,11 @@ class Weights(Plot):
         left, right = np.split(info.log_correction / math.log(10), [count])
         if not len(after):  # a filter that optimises nothing
             after, right = np.zeros(count), np.full(count, np.nan)
-        particle = np.arange(1, len(before) + 1)
+        particle = np.arange(1, count + 1)
         columns = (particle, particle - 0.2, particle + 0.2, before, after, left, right)
         self.source.data = dict(zip(_COLUMNS, columns, strict=True))
         self.figure.y_range.update(start=0, end=1.1 * float(max(before.max(), after.max())))
-        self.figure.x_range.update(start=0.4, end=len(before) + 0.6)
+        self.figure.x_range.update(start=0.4, end=count + 0.6)
         low, high = float(np.nanmin([*left, *right, 0.0])), float(np.nanmax([*left, *right, 0.0]))
         room = max(high - low, 1.0)
         self.figure.extra_y_ranges["correction"].update(start=low - 0.1 * room, end=high + 0.1 * room)

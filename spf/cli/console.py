@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 
 from spf import __version__
 from spf.errors import RunError, SettingError
+from spf.initialise import Doubted, Start
 from spf.sessions import Session, open_session
 
 __all__ = [
@@ -28,8 +29,13 @@ __all__ = [
     "progress_bar",
     "show_version",
     "warn",
+    "warn_of",
 ]
 
+_REMEDIES: dict[Doubted, str] = {
+    "pose": "Give one with --init POSE.json, or begin at a frame that shows an open hand.",
+    "side": "Give the hand with --hand HAND.json if you know it.",
+}
 INTERRUPTED = 130  # exit code after Ctrl-C, as shells have it
 
 
@@ -42,6 +48,12 @@ def warn(sentence: str) -> None:
     """Write a warning on stderr; nothing for ""."""
     if sentence:
         complain(f"warning: {sentence}")
+
+
+def warn_of(start: Start) -> None:
+    """Warn of a start that may be wrong, and say what to do; nothing for one that is believed."""
+    if start.doubted is not None:
+        warn(f"{start.doubt} {_REMEDIES[start.doubted]}")
 
 
 def print_json(value: Any) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from spf.cli.console import print_json, progress_bar, warn
+from spf.cli.console import print_json, progress_bar, warn, warn_of
 from spf.cli.sessions import AsJson
 from spf.doctor import examine, table
 from spf.evaluate import evaluate_run
@@ -34,7 +34,7 @@ def evaluate(
         measures = evaluate_run(run, opened, report)
     if not run.manifest["complete"]:
         warn(f"the run was stopped after {len(run.track)} frames, and only those were measured.")
-    warn(run.plan.start.doubt)
+    warn_of(run.plan.start)
     if as_json:
         print_json(measures)
         return

@@ -19,6 +19,7 @@ from spf.cli.console import (
     print_json,
     progress_bar,
     warn,
+    warn_of,
 )
 from spf.cli.sessions import AsJson, CameraFile, Force, SessionPath
 from spf.errors import RunError, SettingError
@@ -62,7 +63,7 @@ def calibrate(
     if pose is not None:
         write_pose(SavedPose(start.shape.side, start.pose, start.reference, start.frame, start.shape), pose)
     print(_description(start))
-    warn(start.doubt)
+    warn_of(start)
     print(f"Wrote {output}.\nNext: spf track {session} --hand {output} -o RUN")
 
 
@@ -128,7 +129,7 @@ def track(
             )
         plan = Plan(tracker or "spf", preset or "default", settings, seed or 0, init or "auto", first, last, start)
     with opened:
-        warn(plan.start.doubt)
+        warn_of(plan.start)
         track_found = _track_to(output, opened, plan, camera, force)
     _summarise(output, track_found, plan, as_json)
 

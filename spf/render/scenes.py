@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spf.render.palette import FAINT, HAND, OBSERVED, OPTIMISED, PREDICTED, RESIDUAL, gradient
-from spf.render.scene import Lines, Mesh, Points, Scene
+from spf.render.scene import Colour, Lines, Mesh, Points, Scene
 
 __all__ = ["particles_scene", "reconstruction_scene", "trajectories_scene"]
 
@@ -110,6 +110,7 @@ def reconstruction_scene(
     *,
     points: ArrayLike | None = None,
     residuals: ArrayLike | None = None,
+    colour: Colour = HAND,
 ) -> Scene:
     """Show the reconstructed hand among the observed points (Fig. 9).
 
@@ -118,11 +119,12 @@ def reconstruction_scene(
         faces: (F, 3) vertex indices, counter-clockwise seen from outside.
         points: (M, 3) observed points, or None.
         residuals: (M,) distance of each point from the model, metres: the farther, the redder; None draws all alike.
+        colour: of the hand.
 
     Raises:
         ValueError: shapes do not fit together or a number is not finite.
     """
-    hand = Mesh(np.asarray(vertices), np.asarray(faces), HAND)
+    hand = Mesh(np.asarray(vertices), np.asarray(faces), colour)
     if points is None:
         return Scene(meshes=(hand,))
     xyz = np.asarray(points, dtype=np.float32)

@@ -131,15 +131,25 @@ def nudge(page, name, presses):
         page.keyboard.press("ArrowRight")
 
 
-def plotted(page, column):
-    """The values of a column in every data source of the page."""
-    script = """(column) => Bokeh.documents.flatMap((doc) => [...doc._all_models.values()])
-        .filter((model) => model.type === 'ColumnDataSource' && column in model.data)
-        .flatMap((model) => [...model.data[column]])"""
-    return page.evaluate(script, column)
+def columns(page, name):
+    """The values of a column in every data source of the page that has it."""
+    script = """(name) => Bokeh.documents.flatMap((doc) => [...doc._all_models.values()])
+        .filter((model) => model.type === 'ColumnDataSource' && name in model.data)
+        .map((model) => [...model.data[name]])"""
+    return page.evaluate(script, name)
 
 
-PICTURES = ("Particles before and after optimisation", "Trajectories of SMD", "Reconstructed hand", "Depth image")
+def plotted(page, name):
+    """The values of a column in all data sources together."""
+    return [value for values in columns(page, name) for value in values]
+
+
+PICTURES = (
+    "Particles before and after optimisation",
+    "Trajectories of optimisation",
+    "Reconstructed hand",
+    "Depth image",
+)
 
 
 def test_a_bundled_session_is_tracked_and_tuned(page):
@@ -185,12 +195,40 @@ def test_playing_pausing_jumping_and_orbiting(page):
     page.screenshot(path=ARTEFACTS / "orbited.png")
     turned = pixels(page, "Reconstructed hand")
     assert np.abs(turned - before).mean() > 1
-    picture(page, "Trajectories of SMD").dblclick()
+    picture(page, "Trajectories of optimisation").dblclick()
     settled(page)
     assert np.abs(pixels(page, "Reconstructed hand") - before).mean() < np.abs(turned - before).mean() / 4
     page.locator(".frame-slider input").focus()
     page.keyboard.press("Home")
     at_frame(page, 0)
+
+
+def test_trackers_are_compared_at_the_same_frame(page):
+    start_from_truth(page)
+    button(page, "Compare").click()
+    page.get_by_text("So far", exact=True).wait_for()
+    button(page, "Add a tracker").click()
+    hands = ("Hand 1", "Hand 2", "Hand 3")
+    picture(page, hands[2]).wait_for()
+    settled(page)
+    before = {name: pixels(page, name) for name in hands}
+    nudge(page, "k", 5)
+    for index in range(1, 4):
+        button(page, "Step").click()
+        at_frame(page, index)
+    settled(page)
+    page.screenshot(path=ARTEFACTS / "compared.png")
+    for name in hands:
+        after = pixels(page, name)
+        assert after.std() > 5, f"{name} is blank"
+        assert np.abs(after - before[name]).mean() > 0.5, f"{name} did not change"
+    lines = [line for line in columns(page, "ms") if line]  # each lane's, and none of the lane that is not there
+    assert [len(line) for line in lines] == [4, 4, 4]
+    assert all(0 < value < 100 for line in columns(page, "error") for value in line)
+    page.get_by_text("the settings were changed on the way", exact=False).wait_for()
+    page.get_by_text("Frames 0 to 3", exact=False).wait_for()
+    button(page, "One tracker").click()
+    picture(page, "Particles before and after optimisation").wait_for()
 
 
 def test_a_bad_path_is_one_sentence_in_the_page(page):

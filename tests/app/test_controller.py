@@ -6,49 +6,27 @@ import numpy as np
 import pytest
 
 import app.controller
-from app.controller import Controller
-from app.runner import Runner
-from app.server import bundled
-from app.state import State
 from app.views.depth import depth_picture
-from app.views.scenes import PICTURES, scenes_of, view_of
+from app.views.scenes import SCENES, view_of
 from spf.render import ViewCamera
 
-SAMPLE = bundled()["open-close"]
 
-
-@pytest.fixture
-def page():
-    state = State(init="truth")
-    controller = Controller(state, Runner())
-    yield state, controller
-    controller.close()
-
-
-def act(*actions):
-    async def all_of_them():
-        for action in actions:
-            await action()
-
-    asyncio.run(all_of_them())
-
-
-def started(state, controller):
+def started(state, controller, sample, act):
     state.change("rounds", 2)  # quick: what is tracked does not matter here
-    act(lambda: controller.open(SAMPLE), controller.start)
+    act(lambda: controller.open(sample), controller.start)
     assert state.error == ""
 
 
-def test_opening_shows_the_first_frame(page):
+def test_opening_shows_the_first_frame(page, sample, act):
     state, controller = page
-    act(lambda: controller.open(SAMPLE))
+    act(lambda: controller.open(sample))
     assert (state.session.name, state.frame, state.origin, state.error) == ("open-close", 0, None, "")
 
 
 @pytest.mark.parametrize("path", ["", "/no/such/session.mcap", __file__])
-def test_a_path_that_is_no_session_is_one_sentence_and_the_old_session_stays(page, path):
+def test_a_path_that_is_no_session_is_one_sentence_and_the_old_session_stays(page, sample, act, path):
     state, controller = page
-    act(lambda: controller.open(SAMPLE), lambda: controller.open(path))
+    act(lambda: controller.open(sample), lambda: controller.open(path))
     assert state.error.count("\n") == 0
     assert len(state.error) > 20
     assert "Traceback" not in state.error
@@ -56,58 +34,58 @@ def test_a_path_that_is_no_session_is_one_sentence_and_the_old_session_stays(pag
     assert not state.busy
 
 
-def test_start_tracks_the_first_frame_and_step_the_next_ones(page):
+def test_start_tracks_the_first_frame_and_step_the_next_ones(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
     assert state.frame == state.origin.start.frame == 0
     act(controller.step, controller.step)
     assert state.frame == 2
-    assert [summary.frame for summary in state.results.summaries] == [0, 1, 2]
-    assert all(np.isfinite(summary.error) for summary in state.results.summaries)
+    assert [summary.frame for summary in state.lane.results.summaries] == [0, 1, 2]
+    assert all(np.isfinite(summary.error) for summary in state.lane.results.summaries)
 
 
-def test_a_changed_setting_takes_effect_with_the_next_step(page):
+def test_a_changed_setting_takes_effect_with_the_next_step(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
     state.change("n", 7)
     act(controller.step)
     assert len(state.entry.result.info.predicted) == 7
-    assert len(state.results.entry(0).result.info.predicted) == 4
+    assert len(state.lane.results.entry(0).result.info.predicted) == 4
 
 
-def test_a_jump_back_shows_the_stored_frame_and_a_step_shows_it_again(page):
+def test_a_jump_back_shows_the_stored_frame_and_a_step_shows_it_again(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
     act(lambda: controller.jump(3))
-    stored = state.results.entry(1)
+    stored = state.lane.results.entry(1)
     act(lambda: controller.jump(0), controller.step)
     assert state.frame == 1
     assert state.entry is stored
-    assert state.results.last == 3
+    assert state.lane.results.last == 3
 
 
-def test_a_step_from_an_earlier_frame_with_other_settings_tracks_it_anew(page):
+def test_a_step_from_an_earlier_frame_with_other_settings_tracks_it_anew(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
     act(lambda: controller.jump(3), lambda: controller.jump(0))
     state.change("n", 2)
     act(controller.step)
-    assert state.frame == state.results.last == 1
+    assert state.frame == state.lane.results.last == 1
     assert len(state.entry.result.info.predicted) == 2
 
 
-def test_the_same_frames_with_the_same_settings_are_the_same(page):
+def test_the_same_frames_with_the_same_settings_are_the_same(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
     act(controller.step)
     once = state.entry.result.pose
     act(controller.restart, controller.step)
     assert np.array_equal(state.entry.result.pose, once)
 
 
-def test_playing_stops_when_paused_and_never_draws_two_frames_at_once(page):
+def test_playing_stops_when_paused_and_never_draws_two_frames_at_once(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
     shown = []
 
     async def drawn():
@@ -121,9 +99,9 @@ def test_playing_stops_when_paused_and_never_draws_two_frames_at_once(page):
     assert not state.busy
 
 
-def test_a_cancelled_jump_keeps_what_was_tracked(page):
+def test_a_cancelled_jump_keeps_what_was_tracked(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
 
     def cancel_at_two(event):
         if event.new == 2:
@@ -131,15 +109,17 @@ def test_a_cancelled_jump_keeps_what_was_tracked(page):
 
     state.param.watch(cancel_at_two, "frame")
     act(lambda: controller.jump(50))
-    assert state.results.last == 2
+    assert state.lane.results.last == 2
     assert (state.busy, state.error) == (False, "")
     act(controller.step)
     assert state.frame == 3
 
 
-def test_an_unexpected_error_is_a_sentence_in_the_page_and_a_traceback_in_the_log(page, monkeypatch, caplog):
+def test_an_unexpected_error_is_a_sentence_in_the_page_and_a_traceback_in_the_log(
+    page, sample, act, monkeypatch, caplog
+):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
 
     def broken(*_args, **_kwargs):
         raise RuntimeError("the moon is full")
@@ -149,16 +129,16 @@ def test_an_unexpected_error_is_a_sentence_in_the_page_and_a_traceback_in_the_lo
     assert "the moon is full" in state.error
     assert "Traceback" not in state.error
     assert caplog.records[-1].exc_info is not None
-    assert state.results.last == 0
+    assert state.lane.results.last == 0
     assert not state.busy
 
 
 @pytest.mark.parametrize(
     "choice", [{"init": "file"}, {"init": "file", "pose_file": "/no/pose.json"}, {"shape": "file"}]
 )
-def test_a_missing_file_is_one_sentence(page, choice):
+def test_a_missing_file_is_one_sentence(page, sample, act, choice):
     state, controller = page
-    act(lambda: controller.open(SAMPLE))
+    act(lambda: controller.open(sample))
     state.param.update(**choice)
     act(controller.start)
     assert "file" in state.error
@@ -166,25 +146,24 @@ def test_a_missing_file_is_one_sentence(page, choice):
     assert not state.busy
 
 
-def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(page):
+def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(page, sample, act):
     state, controller = page
-    started(state, controller)
-    scenes = scenes_of(state.entry)
-    assert set(scenes) == set(PICTURES)
+    started(state, controller, sample, act)
+    scenes = {name: scene(state.entry) for name, scene in SCENES.items()}
     assert len(scenes["particles"].meshes) == 8
     assert len(scenes["reconstruction"].meshes) == 1
     assert scenes["trajectories"].lines[0].paths.shape[0] == 4 * 6
-    assert isinstance(view_of(state.entry, 0.1, 0.2, 1.5), ViewCamera)
+    assert isinstance(view_of([state.entry], 0.1, 0.2, 1.5), ViewCamera)
     frame = state.session[0]
     plain = depth_picture(frame)
-    full = depth_picture(frame, state.entry.result.observation, state.summary.joints, frame.truth.joints)
+    full = depth_picture(frame, state.entry.seen, [(state.summary.joints, (255, 255, 255))])
     assert plain.startswith(b"\xff\xd8")
     assert plain != full
 
 
-def test_clicks_that_come_faster_than_frames_are_all_done(page):
+def test_clicks_that_come_faster_than_frames_are_all_done(page, sample, act):
     state, controller = page
-    started(state, controller)
+    started(state, controller, sample, act)
 
     async def three_at_once():
         await asyncio.gather(controller.step(), controller.step(), controller.step())

@@ -14,39 +14,40 @@ def state():
 def test_a_change_is_told_apart_from_the_preset_and_undone(state):
     state.change("k", 3.0)
     state.change("n", 8)
-    assert state.differences == {"k": (make_settings("spf").k, 3.0), "n": (4, 8)}
-    state.back_to_preset()
-    assert state.settings == make_settings("spf")
-    assert state.differences == {}
+    assert state.lane.differences == {"k": (make_settings("spf").k, 3.0), "n": (4, 8)}
+    state.lane.back_to_preset()
+    assert state.lane.settings == make_settings("spf")
+    assert state.lane.differences == {}
 
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_a_preset_brings_its_values(state, preset):
     state.change("h", 9.0)
-    state.preset = "paper" if preset == "default" else "default"
-    state.preset = preset
-    assert state.settings == make_settings("spf", preset)
+    state.lane.preset = "paper" if preset == "default" else "default"
+    state.lane.preset = preset
+    assert state.lane.settings == make_settings("spf", preset)
 
 
 def test_a_tracker_brings_its_own_settings(state):
-    state.tracker = "smd"
-    assert state.settings == make_settings("smd")
+    state.lane.tracker = "smd"
+    assert state.lane.settings == make_settings("smd")
 
 
 @pytest.mark.parametrize(("name", "value"), [("n", 0), ("k", float("nan")), ("mu", -1.0), ("nonsense", 1)])
 def test_an_impossible_value_is_refused_in_one_sentence(state, name, value):
-    before = state.settings
+    before = state.lane.settings
     state.change(name, value)
-    assert state.settings == before
+    assert state.lane.settings == before
     assert name in state.error
     assert "\n" not in state.error
 
 
 def test_a_refused_value_is_put_back_in_the_widgets(state):
     seen = []
-    state.param.watch(lambda event: seen.append(event.new), "settings", onlychanged=False)
+    state.param.watch(lambda _event: seen.append(state.lane.settings), "rules")
+    before = state.lane.settings
     state.change("n", 0)
-    assert seen == [state.settings]
+    assert seen == [before]
 
 
 def test_there_is_nowhere_to_step_without_a_start(state):

@@ -1,0 +1,46 @@
+"""What follows the state: drawn when something changed, seldom while playing, and only in the mode that it belongs to."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from typing import Any
+
+import panel as pn
+
+from app.state import State
+
+__all__ = ["Follower"]
+
+_EVERY = 0.4  # s between two redraws while playing
+
+
+class Follower(ABC):
+    """A part of the page.
+
+    Args:
+        state: of the page.
+        mode: of the page that it is seen in.
+        also: parameters of the state that it is drawn after, besides what was tracked.
+    """
+
+    def __init__(self, state: State, mode: str = "one", also: tuple[str, ...] = ()) -> None:
+        self.state, self._mode, self._drawn = state, mode, 0.0
+        state.param.watch(self._follow, ["revision", "playing", *also])
+
+    def _follow(self, *_events: Any) -> None:
+        if self.state.mode != self._mode:
+            return
+        now = time.monotonic()
+        if self.state.playing and now - self._drawn < _EVERY:
+            return  # the next frame comes soon, and the end of playing redraws in any case
+        self._drawn = now
+        document = pn.state.curdoc
+        if document is None or document.session_context is None:
+            self.draw()
+        else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
+            document.add_next_tick_callback(self.draw)
+
+    @abstractmethod
+    def draw(self) -> None:
+        """Replace what is shown by what the state says."""
