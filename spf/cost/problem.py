@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from spf.cost.settings import CostSettings
 from spf.cost.spheres import digit_spheres
+from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
 from spf.kernels.cost import CostWeights, Spheres, allocate
 from spf.kernels.golden import golden_energies, make_canvas
@@ -139,4 +140,5 @@ def correspondences(problem: Problem, pose: Array, *, zbuffer: bool = True) -> C
     )  # fmt: skip
     matches = np.empty(len(problem.data_pool), np.int32)
     match_pixels(sight, count, arrays, chain, p, problem.data_pool, problem.match_radius, matches)
-    return Correspondences(sight.points, sight.normals, sight.visible[:count].copy(), matches)
+    posed = pose_hand(hand, p, problem.reference)
+    return Correspondences(posed.vertices, posed.normals, sight.visible[:count].copy(), matches)
