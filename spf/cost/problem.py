@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from spf.cost.settings import CostSettings
 from spf.cost.spheres import digit_spheres
+from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
 from spf.kernels.cost import CostWeights, Spheres, allocate
 from spf.kernels.golden import golden_energies, make_canvas
@@ -16,6 +17,7 @@ from spf.kernels.kinematics import make_chain
 from spf.kernels.sight import make_sight, match_pixels, see
 from spf.kernels.smd import Scratch, evaluate_poses, make_scratch
 from spf.observation import Observation
+from spf.parallel import per_thread
 
 __all__ = ["Correspondences", "Problem", "correspondences", "costs", "golden", "make_problem", "scratch_of"]
 
@@ -23,6 +25,7 @@ Array = NDArray[np.float64]
 GOLDEN_TRUNCATION = 0.04  # T, m
 POOL = 90  # observed pixels that are matched anew each round
 _MATCH_RADIUS = 0.06  # m
+_canvas = per_thread(make_canvas)
 
 
 class Problem(NamedTuple):
@@ -94,7 +97,7 @@ def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple
     if scales is None:
         scales = np.ones(len(poses))
     hand, arrays = problem.hand, problem.observation.arrays
-    canvas = make_canvas(
+    canvas = _canvas(
         len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(hand.proxy.vertices), *arrays.grid_depth.shape
     )
     energies, overlaps = np.empty(len(poses)), np.empty(len(poses))
@@ -105,12 +108,23 @@ def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple
     return energies, overlaps
 
 
-def scratch_of(problem: Problem, points: int = 0, data_points: int = 0) -> Scratch:
-    """Return what kernels need to work on a problem in one thread, for samples of the given sizes."""
-    hand, grid = problem.hand, problem.observation.arrays.grid_depth
-    work = allocate(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone), hand.dofs)
-    sight = make_sight(len(hand.skin.vertices), len(hand.proxy.vertices), *grid.shape)
-    return make_scratch(hand.dofs, points, data_points, len(problem.data_pool), work, sight)
+def scratch_of(problem: Problem) -> Scratch:
+    """Return what kernels need to work on a problem in this thread, until it is asked for the next time."""
+    hand, settings = problem.hand, problem.settings
+    return _scratch(
+        len(hand.skeleton.parent), len(hand.skeleton.revolute_bone), len(problem.spheres.bone), hand.dofs,
+        len(hand.skin.vertices), len(hand.proxy.vertices), *problem.observation.arrays.grid_depth.shape,
+        settings.points, settings.data_points if settings.coverage > 0 else 0, len(problem.data_pool),
+    )  # fmt: skip
+
+
+@per_thread
+def _scratch(
+    bones: int, revolutes: int, spheres: int, dofs: int, vertices: int, proxy_vertices: int, height: int, width: int,
+    points: int, data_points: int, pool: int,
+) -> Scratch:  # fmt: skip
+    work, sight = allocate(bones, revolutes, spheres, dofs), make_sight(vertices, proxy_vertices, height, width)
+    return make_scratch(dofs, points, data_points, pool, work, sight)
 
 
 class Correspondences(NamedTuple):
@@ -139,4 +153,5 @@ def correspondences(problem: Problem, pose: Array, *, zbuffer: bool = True) -> C
     )  # fmt: skip
     matches = np.empty(len(problem.data_pool), np.int32)
     match_pixels(sight, count, arrays, chain, p, problem.data_pool, problem.match_radius, matches)
-    return Correspondences(sight.points, sight.normals, sight.visible[:count].copy(), matches)
+    posed = pose_hand(hand, p, problem.reference)
+    return Correspondences(posed.vertices, posed.normals, sight.visible[:count].copy(), matches)

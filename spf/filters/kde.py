@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+
+from spf.filters.particles import log_sum_exp
 
 __all__ = ["log_correction", "log_density", "paper_window", "silverman_window"]
 
@@ -27,7 +28,7 @@ def log_density(at: Array, samples: Array, window: float) -> Array:
     count, dimensions = samples.shape
     squared = ((at[:, None, :] - samples[None, :, :]) ** 2).sum(axis=2) / window**2
     constant = math.log(count) + dimensions * math.log(window) + 0.5 * dimensions * math.log(2.0 * math.pi)
-    return np.asarray(logsumexp(-0.5 * squared, axis=1) - constant)
+    return np.asarray(log_sum_exp(-0.5 * squared) - constant)
 
 
 def log_correction(predicted: Array, optimised: Array, window: float) -> Array:

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
-__all__ = ["ParticleSet", "ess", "normalise", "weighted_mean"]
+__all__ = ["ParticleSet", "ess", "log_sum_exp", "normalise", "weighted_mean"]
 
 Array = NDArray[np.float64]
 
@@ -27,9 +26,20 @@ class ParticleSet(NamedTuple):
     log_weights: Array
 
 
+def log_sum_exp(values: Array) -> Array:
+    """``ln Σ exp`` over the last axis (…, N), without overflow; -inf where all values are.
+
+    SciPy's takes a tenth of a millisecond a call whatever the size, and a frame needs several.
+    """
+    most = values.max(axis=-1, keepdims=True)
+    most[~np.isfinite(most)] = 0.0
+    with np.errstate(divide="ignore"):  # the logarithm of 0 is -inf, as it should be
+        return np.asarray(np.log(np.exp(values - most).sum(axis=-1)) + most[..., 0])
+
+
 def normalise(log_weights: Array) -> Array:
     """Return log-weights (N,) whose exponentials sum to 1; uniform ones if all are -inf."""
-    total = logsumexp(log_weights)
+    total = log_sum_exp(log_weights)
     if not np.isfinite(total):
         return np.full(len(log_weights), -np.log(len(log_weights)))
     return np.asarray(log_weights - total)
@@ -37,7 +47,7 @@ def normalise(log_weights: Array) -> Array:
 
 def ess(log_weights: Array) -> float:
     """Effective sample size ``1/Σπ²`` of normalised log-weights, between 1 and N."""
-    return float(np.exp(-logsumexp(2.0 * log_weights)))
+    return float(np.exp(-log_sum_exp(2.0 * log_weights)))
 
 
 def weighted_mean(values: Array, log_weights: Array) -> Array:

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from spf.cost.problem import Problem, golden
 from spf.hand.kinematics import angles_of, rotation_about
 from spf.hand.model import DIP_PER_PIP
+from spf.parallel import map_threads, threads
 from spf.settings import Settings, setting
 
 __all__ = ["ProposalSettings", "propose", "recombine"]
@@ -78,7 +79,8 @@ def propose(
     result, renders = predicted.copy(), 0
     for index in range(len(predicted) - count, len(predicted)):
         candidates = palm_changes(problem, predicted[index], estimate, settings.palm_proposals, rng)
-        energies, _ = golden(problem, candidates)
+        parts = np.array_split(candidates, min(threads(), len(candidates)))
+        energies = np.concatenate(map_threads(lambda part: golden(problem, part)[0], parts))
         pose, used = curl_digits(problem, candidates[int(np.argmin(energies))], float(energies.min()))
         result[index], renders = pose, renders + len(candidates) + used
     if settings.learned and problem.observation.suggestions:

@@ -88,7 +88,7 @@ def optimise(
         np.ascontiguousarray(start), problem.reference,
         start if prior is None else prior, np.zeros(dofs) if precision is None else precision,
         step_bounds(dofs), problem.curvature_floor, draws, pool,
-        scratch_of(problem, parameters.points, parameters.data_points), result, *trace,
+        scratch_of(problem), result, *trace,
     )  # fmt: skip
     cut = Trajectory(*(part[: done + 1] for part in trace)) if record else None
     return result, cut, int(done)

@@ -3,9 +3,10 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.special import logsumexp
 
 from spf.filters.dynamics import DynamicsSettings, drift, noise_scale, predict
-from spf.filters.particles import ess, normalise, weighted_mean
+from spf.filters.particles import ess, log_sum_exp, normalise, weighted_mean
 from spf.filters.resampling import systematic
 from spf.hand import load_hand
 
@@ -20,6 +21,15 @@ def test_weights_do_not_depend_on_a_constant(logs: np.ndarray, constant: float) 
 @given(_LOGS)
 def test_the_effective_sample_size_lies_between_1_and_n(logs: np.ndarray) -> None:
     assert 1 - 1e-9 <= ess(normalise(logs)) <= len(logs) + 1e-6
+
+
+@given(st.lists(_LOGS.map(lambda logs: np.resize(logs, 5)), min_size=1, max_size=4).map(np.array))
+def test_sums_of_exponentials_are_scipys(logs: np.ndarray) -> None:
+    np.testing.assert_allclose(log_sum_exp(logs), logsumexp(logs, axis=1), rtol=1e-12, atol=1e-12)
+
+
+def test_a_sum_of_vanishing_exponentials_vanishes() -> None:
+    np.testing.assert_array_equal(log_sum_exp(np.array([[-np.inf, -np.inf], [-np.inf, 0.0]])), [-np.inf, 0.0])
 
 
 def test_equal_weights_have_full_effective_size() -> None:

@@ -32,10 +32,17 @@ def draw(vertices: np.ndarray, faces: np.ndarray, camera: Camera) -> tuple[np.nd
     return projected, depth
 
 
-def bent(hand: Hand, z: float = 0.5) -> PosedHand:
+PALM = np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+
+
+def bent_pose(hand: Hand, z: float = 0.5) -> np.ndarray:
     pose = hand.constrain(np.full(hand.dofs, 0.35))
     pose[:6] = 0.0, 0.0, z, 0.4, 0.3, -0.2
-    return pose_hand(hand, pose, np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]))
+    return pose
+
+
+def bent(hand: Hand, z: float = 0.5) -> PosedHand:
+    return pose_hand(hand, bent_pose(hand, z), PALM)
 
 
 @pytest.fixture(scope="module")
@@ -103,13 +110,19 @@ def test_the_nearer_of_two_triangles_wins_whatever_their_order() -> None:
 
 
 class TestVisibility:
-    def visible(self, hand: Hand, posed: PosedHand, camera: Camera) -> np.ndarray:
+    def visible(self, hand: Hand, pose: np.ndarray, palm: np.ndarray, camera: Camera) -> np.ndarray:
+        posed = pose_hand(hand, pose, palm)
         _, depth = draw(posed.vertices, hand.faces, camera)
-        found = np.empty(len(posed.vertices), np.int32)
-        count = visible_vertices(posed.vertices, posed.normals, numbers(camera), depth, 0.003, found)
-        seen = np.zeros(len(posed.vertices), dtype=bool)
-        seen[found[:count]] = True
-        return seen
+        chain = make_chain(len(hand.skeleton.parent), len(hand.skeleton.revolute_bone))
+        pose_bones(hand.skeleton, pose, palm, chain)
+        found, near = np.empty(len(posed.vertices), np.int32), np.empty((7, len(posed.vertices)), np.float32)
+        count = visible_vertices(hand.skin, chain.bones, pose, numbers(camera), depth, 0.003, found, near)
+        listed = found[:count]
+        places = posed.vertices[listed] - pose[:3]
+        np.testing.assert_allclose(near[:3, :count].T, places, atol=1e-6)
+        np.testing.assert_allclose(near[3:6, :count].T, posed.normals[listed], atol=1e-6)
+        np.testing.assert_allclose(near[6, :count], np.sum(places**2, axis=1), atol=1e-6)
+        return np.isin(np.arange(len(posed.vertices)), listed)
 
     @CAMERAS
     def test_visible_vertices_face_the_camera_and_lie_on_the_picture(self, hand: Hand, camera: Camera) -> None:
@@ -117,8 +130,7 @@ class TestVisibility:
             width=camera.width * 8, height=camera.height * 8,
             fx=camera.fx * 8, fy=camera.fy * 8, cx=camera.cx * 8, cy=camera.cy * 8,
         )  # fmt: skip
-        posed = bent(hand)
-        seen = self.visible(hand, posed, fine)
+        posed, seen = bent(hand), self.visible(hand, bent_pose(hand), PALM, fine)
         assert 0.2 < seen.mean() < 0.6
         sight = posed.vertices / np.linalg.norm(posed.vertices, axis=1, keepdims=True)
         if camera.model == "orthographic":
@@ -138,8 +150,8 @@ class TestVisibility:
         turned = np.diag([-1.0, 1.0, -1.0]) @ palm
         fine = Camera(448, 384, 880.0, 880.0, 220.0, 190.0)
         distal = np.isin(hand.skin.influence_bone[:, 0], [6, 9, 12, 15])
-        assert not self.visible(hand, pose_hand(hand, pose, turned), fine)[distal].any()
-        assert self.visible(hand, pose_hand(hand, pose, palm), fine)[distal].any()
+        assert not self.visible(hand, pose, turned, fine)[distal].any()
+        assert self.visible(hand, pose, palm, fine)[distal].any()
 
 
 class TestComparison:
