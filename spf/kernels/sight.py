@@ -15,7 +15,7 @@ from spf.kernels.kinematics import Chain, Skeleton, pose_bones
 from spf.kernels.render import FAR, project_skin, rasterise
 from spf.kernels.skinning import Skin, skin
 
-__all__ = ["Sight", "make_sight", "match_pixels", "see", "visible_vertices"]
+__all__ = ["Sight", "keep_first", "make_sight", "match_pixels", "see", "visible_vertices"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -36,6 +36,7 @@ class Sight(NamedTuple):
         near: (6, V) float32 place and normal of the visible vertices, for the matching.
         coarse: (P, 3) float32 the projected proxy.
         depth: (h, w) float32 z-buffer.
+        chosen: (V,) marks of visible vertices.
     """
 
     points: Array
@@ -44,6 +45,7 @@ class Sight(NamedTuple):
     near: Image
     coarse: Image
     depth: Image
+    chosen: NDArray[np.uint8]
 
 
 @allocating
@@ -56,6 +58,7 @@ def make_sight(vertices: int, proxy_vertices: int, height: int, width: int) -> S
         np.zeros((6, vertices), np.float32),
         np.zeros((proxy_vertices, 3), np.float32),
         np.zeros((height, width), np.float32),
+        np.zeros(vertices, np.uint8),
     )
 
 
@@ -114,6 +117,26 @@ def see(
         near[0, c], near[1, c], near[2, c] = points[i, 0], points[i, 1], points[i, 2]
         near[3, c], near[4, c], near[5, c] = normals[i, 0], normals[i, 1], normals[i, 2]
     return count
+
+
+@part
+def keep_first(sight: Sight, count: int, order: NDArray[np.int32], most: int) -> int:
+    """Keep of the visible vertices the first ones in an order (V,) of all vertices, at most so many; returns how many.
+
+    The same order gives similar poses nearly the same vertices: what they are compared on is common to all particles.
+    """
+    visible, chosen = sight.visible, sight.chosen
+    for c in range(count):
+        chosen[index(visible[c])] = 1
+    kept = 0
+    for o in range(order.shape[0]):
+        i = index(order[o])
+        if chosen[i] == 1:
+            chosen[i] = 0
+            if kept < most:
+                visible[kept] = order[o]
+                kept += 1
+    return kept
 
 
 @kernel
