@@ -39,7 +39,7 @@ _MOST_EXPONENT = 1e12
 
 
 @dataclasses.dataclass(frozen=True)
-class ApfSettings(ResamplingSettings, DynamicsSettings, drift, CostSettings):
+class ApfSettings(ResamplingSettings, DynamicsSettings, CostSettings):
     """All settings of the annealed particle filter."""
 
     n: int = setting(200, "number of particles", group=_FILTER, low=2, high=100000, symbol="N")

@@ -24,7 +24,7 @@ _FILTER = "Filter"
 
 
 @dataclasses.dataclass(frozen=True)
-class CondensationSettings(ResamplingSettings, DynamicsSettings, drift, LikelihoodSettings):
+class CondensationSettings(ResamplingSettings, DynamicsSettings, LikelihoodSettings):
     """All settings of the Condensation filter."""
 
     n: int = setting(500, "number of particles", group=_FILTER, low=1, high=100000, symbol="N")

@@ -98,7 +98,9 @@ def step(
             trajectories = (*trajectories[: mixed.place], mixed.trajectory, *trajectories[mixed.place + 1 :])
         iterations += mixed.evaluations
     clock("recombine")
-    window, log_c = correct(predicted, optimised, noise_scale(hand, settings, interval), settings)  # (d) combine, correct
+    window, log_c = correct(
+        predicted, optimised, noise_scale(hand, settings, interval), settings
+    )  # (d) combine, correct
     clock("correct")
     judged = judge(problem, np.concatenate([predicted, optimised]))
     likelihood = log_likelihood(judged, settings, settings.sigma2)
