@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from spf.errors import SettingError
-from spf.filters import single, smart
+from spf.filters import annealed, condensation, single, smart
 from spf.filters.step import State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 from spf.observation import Observation
+from spf.optimisers import bfgs, gd, lm, powell, smd
 from spf.settings import Settings
 
 __all__ = ["PRESETS", "TRACKERS", "Step", "Tracker", "make_settings"]
@@ -45,29 +47,53 @@ class Tracker(NamedTuple):
         title: for headings.
         settings: class of its settings.
         step: one frame.
+        cost: name of the whole-number setting that a frame's time grows with: what is chosen to give it more or less
+            time.
+        presets: preset → changes from the defaults beside those of all trackers.
     """
 
     name: str
     title: str
     settings: type[Settings]
     step: Step
+    cost: str
+    presets: Mapping[str, Mapping[str, Any]] = {}
 
 
 TRACKERS: dict[str, Tracker] = {
     tracker.name: tracker
     for tracker in (
-        Tracker("spf", "Smart Particle Filter", smart.SpfSettings, smart.step),
-        Tracker("smd", "One SMD tracker", single.SingleSettings, single.step),
+        Tracker("spf", "Smart Particle Filter", smart.SpfSettings, smart.step, "n", {"paper": {"n": 4}}),
+        Tracker("smd", "One SMD tracker", single.SingleSmdSettings, partial(single.step, smd.optimise), "rounds"),
+        Tracker("gd", "Gradient descent", single.SingleGdSettings, partial(single.step, gd.optimise), "rounds"),
+        Tracker("bfgs", "L-BFGS-B", single.SingleBfgsSettings, partial(single.step, bfgs.optimise), "rounds"),
+        Tracker(
+            "powell",
+            "Powell's method",
+            single.SinglePowellSettings,
+            partial(single.step, powell.optimise),
+            "evaluations",
+        ),
+        Tracker("lm", "Levenberg-Marquardt", single.SingleLmSettings, partial(single.step, lm.optimise), "rounds"),
+        Tracker("condensation", "Condensation", condensation.CondensationSettings, condensation.step, "n"),
+        Tracker(
+            "apf",
+            "Annealed particle filter",
+            annealed.ApfSettings,
+            annealed.step,
+            "n",
+            {"paper": {"n": 500, "layers": 12, "points": 350, "survival": 0.5}},
+        ),
     )
 }
 
-#: Changes from the defaults. ``paper`` is the paper's own cost, (3), with its N, |S| and k.
+#: Changes from the defaults, for the trackers that have the setting. ``paper`` is the paper's own cost, (3), with its N,
+#: |S| and k; a tracker's own changes come on top.
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
     "paper": {
         "k": 3.0,
         "points": 45,
-        "n": 4,
         "coverage": 0.0,
         "data_points": 0,
         "background": 1.0,
@@ -79,7 +105,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "recombination": 0.0,
         "learned": False,
         "prediction_pull": 0.0,
-        "velocity": 1.0,
+        "dynamics": "first-order",
     },
 }
 
@@ -97,4 +123,5 @@ def make_settings(tracker: str, preset: str = "default", changes: Mapping[str, s
     settings = TRACKERS[tracker].settings()
     known = {info.name for info in settings.describe()}
     chosen = {name: value for name, value in PRESETS[preset].items() if name in known}
+    chosen |= TRACKERS[tracker].presets.get(preset, {})
     return settings.replace(**chosen).with_text(changes or {})

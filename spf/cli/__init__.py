@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import typer
 
-from spf.cli import results, sessions, tracking
+from spf.cli import comparing, results, sessions, tracking
 from spf.cli.console import INTERRUPTED, complain, show_version
 from spf.errors import SpfError
 
@@ -29,6 +29,7 @@ app = typer.Typer(
 )
 for command in (*sessions.COMMANDS, *tracking.COMMANDS, *results.COMMANDS):
     app.command()(command)
+app.command(name="compare")(comparing.compare_trackers)
 
 
 @app.callback()

@@ -78,13 +78,21 @@ def make_problem(
     )
 
 
-def costs(problem: Problem, poses: Array) -> Array:
-    """E (3) of poses (N, D) on all the model points that the camera sees and the frame's pool of pixels, (N,)."""
+def costs(problem: Problem, poses: Array, order: NDArray[np.int32] | None = None) -> Array:
+    """E (3) of poses (N, D) on model points that the camera sees and on the frame's pool of pixels, (N,).
+
+    Args:
+        problem: the frame's cost.
+        poses: (N, D).
+        order: (V,) of the vertices, whose first |S| visible ones are compared; None to compare all visible ones.
+    """
     hand, energies = problem.hand, np.empty(len(poses))
+    none = np.empty(0, np.int32)
     evaluate_poses(
         hand.skeleton, hand.skin, hand.proxy, hand.proxy_faces, problem.spheres, problem.observation.arrays,
         problem.weights, bool(problem.settings.zbuffer), problem.match_radius,
-        np.ascontiguousarray(poses), problem.reference, problem.data_pool, scratch_of(problem), energies,
+        np.ascontiguousarray(poses), problem.reference, problem.data_pool,
+        none if order is None else order, int(problem.settings.points), scratch_of(problem), energies,
     )  # fmt: skip
     return energies
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spf.cost.problem import Problem, correspondences, scratch_of
 from spf.errors import HandError
-from spf.kernels.cost import cost_products
+from spf.kernels.cost import Workspace, cost_products
 from spf.kernels.curvature import gauss_newton_diagonal
 
 __all__ = ["Products", "Sample", "curvature", "products", "see"]
@@ -59,6 +59,7 @@ def products(
     *,
     prior: ArrayLike | None = None,
     precision: ArrayLike | None = None,
+    work: Workspace | None = None,
 ) -> Products:
     """Evaluate E, its gradient (14) and its Gauss-Newton product with a direction (22), in one pass.
 
@@ -68,12 +69,13 @@ def products(
         direction: (D,) v.
         sample: what is compared; correspondences and tangent planes are taken at ``pose`` and held fixed (7-11).
         prior, precision: (D,) pull ½ π (p − p̄)²; none when None.
+        work: to work in, for a caller that evaluates many poses in one thread.
 
     Raises:
         HandError: a pose has the wrong length or is not finite.
     """
     hand, p, v = problem.hand, _checked(problem, pose), _checked(problem, direction)
-    work = scratch_of(problem).work
+    work = scratch_of(problem).work if work is None else work
     gradient, product = np.empty(hand.dofs), np.empty(hand.dofs)
     energy = cost_products(
         hand.skeleton, hand.skin, problem.spheres, problem.observation.arrays, problem.weights,

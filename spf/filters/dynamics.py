@@ -1,4 +1,4 @@
-"""First-order dynamics (Fig. 6b): p ← p + ṗ·Δt + noise."""
+"""Dynamics (Fig. 6b): p ← p + f·ṗ·Δt + noise, with f of the model that is chosen."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ __all__ = ["DynamicsSettings", "drift", "noise_scale", "predict"]
 
 Array = NDArray[np.float64]
 _DYNAMICS = "Dynamics"
+DYNAMICS = ("first-order", "damped", "random-walk")
 _FRAME = 1.0 / 30.0  # s: the noise below is that of a frame at 30 frames/s
 
 
@@ -30,9 +31,15 @@ class DynamicsSettings(Settings):
     noise_digits: float = setting(
         0.12, "noise of the digits' angles per frame", group=_DYNAMICS, low=1e-4, high=2.0, unit="rad"
     )
+    dynamics: str = setting(
+        "damped",
+        "what happens to the last velocity: all of it is kept (the paper's first-order model), a share, or nothing",
+        group=_DYNAMICS,
+        choices=DYNAMICS,
+    )
     velocity: float = setting(
         0.5,
-        "share of the last velocity that is kept; 1 is the paper's first-order model",
+        "share of the last velocity that the damped model keeps",
         group=_DYNAMICS,
         low=0.0,
         high=1.0,
@@ -48,8 +55,9 @@ def noise_scale(hand: Hand, settings: DynamicsSettings, interval: float = _FRAME
 
 
 def drift(hand: Hand, poses: Array, velocities: Array, interval: float, settings: DynamicsSettings) -> Array:
-    """Move poses (N, D) by their velocity alone, within the joint limits: the mean of the prediction."""
-    return hand.constrain(poses + settings.velocity * velocities * interval)
+    """Move poses (N, D) by what is kept of their velocity, within the joint limits: the mean of the prediction."""
+    kept = {"first-order": 1.0, "damped": settings.velocity, "random-walk": 0.0}[settings.dynamics]
+    return hand.constrain(poses + kept * velocities * interval)
 
 
 def predict(

@@ -2,16 +2,66 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from spf.filters.particles import log_sum_exp
+from spf.settings import Settings, setting
 
-__all__ = ["log_correction", "log_density", "paper_window", "silverman_window"]
+__all__ = [
+    "WINDOW_RULES",
+    "CorrectionSettings",
+    "correct",
+    "log_correction",
+    "log_density",
+    "paper_window",
+    "silverman_window",
+]
 
 Array = NDArray[np.float64]
+_LEAST_WINDOW = 1e-6  # of samples that all lie in one place
+
+
+@dataclasses.dataclass(frozen=True)
+class CorrectionSettings(Settings):
+    """How the weights of optimised samples are corrected."""
+
+    h: float = setting(
+        4.0,
+        "window of the kernel density estimate, in units of the process noise",
+        group="Filter",
+        low=0.01,
+        high=100.0,
+        symbol="h",
+    )
+    window_rule: str = setting(
+        "fixed",
+        "how the window is chosen: h itself, the paper's (29), or the d-dimensional rule",
+        group="Filter",
+        choices=("fixed", "paper", "silverman"),
+    )
+    correction: bool = setting(True, "correct the weights of optimised samples (32)", group="Filter")
+
+
+def correct(predicted: Array, optimised: Array, scale: Array, settings: CorrectionSettings) -> tuple[float, Array]:
+    """Window h, and log c (32) of N predicted samples, then of N⁺ optimised ones; zeros when switched off.
+
+    Args:
+        predicted, optimised: (N, d), (N⁺, d).
+        scale: (d,) by which entries are divided to be comparable: the process noise.
+        settings: the window, and whether to correct.
+    """
+    white, white_optimised = predicted / scale, optimised / scale
+    window = settings.h
+    if settings.window_rule != "fixed":
+        window = max(WINDOW_RULES[settings.window_rule](white), _LEAST_WINDOW)
+    if not settings.correction:
+        return window, np.zeros(len(predicted) + len(optimised))
+    return window, log_correction(white, white_optimised, window)
 
 
 def log_density(at: Array, samples: Array, window: float) -> Array:
@@ -26,7 +76,7 @@ def log_density(at: Array, samples: Array, window: float) -> Array:
         (M,) log f.
     """
     count, dimensions = samples.shape
-    squared = ((at[:, None, :] - samples[None, :, :]) ** 2).sum(axis=2) / window**2
+    squared = cdist(at, samples, "sqeuclidean") / window**2
     constant = math.log(count) + dimensions * math.log(window) + 0.5 * dimensions * math.log(2.0 * math.pi)
     return np.asarray(log_sum_exp(-0.5 * squared) - constant)
 
@@ -63,3 +113,7 @@ def silverman_window(samples: Array) -> float:
     return float(
         (4.0 / (dimensions + 2)) ** (1.0 / (dimensions + 4)) * _spread(samples) * count ** (-1.0 / (dimensions + 4))
     )
+
+
+#: Rules that find the window from the predicted samples.
+WINDOW_RULES = {"paper": paper_window, "silverman": silverman_window}

@@ -1,4 +1,4 @@
-"""One SMD tracker without a filter (spec 7; Fig. 9, left column; Fig. 10): each frame descends from the last estimate."""
+"""One tracker without a filter (spec 7; Fig. 9, left column; Fig. 10): each frame is optimised from the last estimate."""
 
 from __future__ import annotations
 
@@ -6,39 +6,91 @@ import dataclasses
 
 import numpy as np
 
+from spf.cost.problem import make_problem
 from spf.cost.settings import CostSettings
-from spf.cost.spheres import digit_spheres
-from spf.filters import smart
-from spf.filters.step import State, StepInfo
+from spf.filters.estimate import Samples, conclude
+from spf.filters.likelihood import SIGMA2, judge, log_likelihood
+from spf.filters.step import Clock, State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 from spf.observation import Observation
-from spf.optimisers.smd import SmdSettings
+from spf.optimisers.bfgs import BfgsSettings
+from spf.optimisers.lm import LmSettings
+from spf.optimisers.powell import PowellSettings
+from spf.optimisers.smd import DescentSettings, SmdSettings
+from spf.optimisers.trajectory import Optimise
 
-__all__ = ["SingleSettings", "step"]
+__all__ = [
+    "SingleBfgsSettings",
+    "SingleGdSettings",
+    "SingleLmSettings",
+    "SinglePowellSettings",
+    "SingleSmdSettings",
+    "step",
+]
 
 
 @dataclasses.dataclass(frozen=True)
-class SingleSettings(SmdSettings, CostSettings):
-    """Settings of the single tracker."""
+class SingleSmdSettings(SmdSettings, CostSettings):
+    """Settings of one SMD tracker."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SingleGdSettings(DescentSettings, CostSettings):
+    """Settings of a tracker by gradient descent."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SingleBfgsSettings(BfgsSettings, CostSettings):
+    """Settings of a tracker by L-BFGS-B."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SinglePowellSettings(PowellSettings, CostSettings):
+    """Settings of a tracker by Powell's method."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SingleLmSettings(LmSettings, CostSettings):
+    """Settings of a tracker by Levenberg-Marquardt."""
 
 
 def step(
+    optimise: Optimise,
     rng: np.random.Generator,
     state: State,
     observation: Observation,
     hand: Hand,
-    settings: SingleSettings,
+    settings: CostSettings,
     *,
     spheres: Spheres | None = None,
     record: bool = False,
     effort: float = 1.0,
 ) -> tuple[State, StepInfo]:
-    """Track one frame: the Smart Particle Filter's step with one particle, no noise and nothing but its optimum kept."""
-    alone = smart.SpfSettings(
-        **settings.to_dict(), n=1, noise_translation=1e-5, noise_rotation=1e-4, noise_digits=1e-4, velocity=0.0,
-        structured=0.0, recombination=0.0, learned=False, correction=False, keep_predicted=False, prediction_pull=0.0,
+    """Track one frame: what the optimiser finds from the last estimate is the estimate.
+
+    Args:
+        optimise: the optimiser.
+        rng, state, observation, hand, spheres, record, effort: as of :func:`spf.filters.smart.step`.
+        settings: of the cost and of that optimiser.
+
+    Returns:
+        (state, info): one predicted sample, without weight, and one optimised sample, with all of it.
+    """
+    clock = Clock()
+    interval = max(observation.time - state.time, 1e-3)
+    problem = make_problem(hand, observation, settings, state.reference, rng, spheres)
+    before = state.estimate
+    found, trajectory, evaluations = optimise(problem, settings, rng, before, effort=effort, record=record)
+    clock("optimise")
+    judged = judge(problem, np.stack([before, found]))
+    likelihood, log_weights = log_likelihood(judged, settings, SIGMA2), np.array([-np.inf, 0.0])
+    clock("weigh")
+    samples = Samples(
+        np.zeros(1, np.intp), ("estimate",), before[None], before[None], found[None],
+        judged, likelihood, np.zeros(2), log_weights, float("nan"),
     )  # fmt: skip
-    return smart.step(
-        rng, state, observation, hand, alone, spheres=spheres or digit_spheres(hand), record=record, effort=effort
-    )
+    return conclude(
+        problem, SIGMA2, state, interval, samples, clock,
+        evaluations=evaluations + 2, trajectories=() if trajectory is None else (trajectory,),
+    )  # fmt: skip

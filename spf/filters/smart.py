@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.cost.problem import Problem, costs, golden, make_problem
-from spf.cost.settings import CostSettings
+from spf.cost.problem import Problem, golden, make_problem
 from spf.filters.dynamics import DynamicsSettings, drift, noise_scale, predict
-from spf.filters.kde import log_correction, paper_window, silverman_window
-from spf.filters.particles import ParticleSet, ess, normalise, weighted_mean
+from spf.filters.estimate import Samples, conclude
+from spf.filters.kde import CorrectionSettings, correct
+from spf.filters.likelihood import LikelihoodSettings, judge, log_likelihood
+from spf.filters.particles import normalise
 from spf.filters.proposals import ProposalSettings, propose, recombine
-from spf.filters.resampling import systematic
-from spf.filters.step import Clock, State, StepInfo, recentred
+from spf.filters.resampling import ResamplingSettings, resample
+from spf.filters.step import Clock, State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
 from spf.observation import Observation
@@ -30,33 +30,16 @@ __all__ = ["SpfSettings", "step"]
 
 Array = NDArray[np.float64]
 _FILTER = "Filter"
-WINDOW_RULES = ("fixed", "paper", "silverman")
 
 
 @dataclasses.dataclass(frozen=True)
-class SpfSettings(ProposalSettings, DynamicsSettings, SmdSettings, CostSettings):
+class SpfSettings(
+    ProposalSettings, CorrectionSettings, ResamplingSettings, DynamicsSettings, SmdSettings, LikelihoodSettings
+):
     """All settings of the Smart Particle Filter."""
 
     n: int = setting(4, "number of particles", group=_FILTER, low=1, high=4096, symbol="N")
-    h: float = setting(
-        4.0,
-        "window of the kernel density estimate, in units of the process noise",
-        group=_FILTER,
-        low=0.01,
-        high=100.0,
-        symbol="h",
-    )
-    window_rule: str = setting(
-        "fixed",
-        "how the window is chosen: h itself, the paper's (29), or the d-dimensional rule",
-        group=_FILTER,
-        choices=WINDOW_RULES,
-    )
-    correction: bool = setting(True, "correct the weights of optimised samples (32)", group=_FILTER)
     keep_predicted: bool = setting(True, "keep the predicted samples beside the optimised ones", group=_FILTER)
-    sigma2: float = setting(
-        4.5, "variance of the likelihood, log p = -(E + golden)/σ²", group=_FILTER, low=1e-3, high=1e4, symbol="σ²"
-    )
     prediction_pull: float = setting(
         0.01, "pull of SMD to the prediction, in units of the process noise", group=_FILTER, low=0.0, high=10.0
     )
@@ -91,7 +74,7 @@ def step(
     clock = Clock()
     interval = max(observation.time - state.time, 1e-3)
     problem = make_problem(hand, observation, settings, state.reference, rng, spheres)
-    ancestors = systematic(state.particles.log_weights, settings.n, rng)  # (a) resample
+    ancestors = resample(state.particles.log_weights, settings.n, settings, rng)  # (a) resample
     before = state.particles.poses[ancestors]
     expected = drift(hand, before, state.particles.velocities[ancestors], interval, settings)
     predicted = predict(hand, expected, interval, settings, rng)  # (b) predict
@@ -115,30 +98,20 @@ def step(
             trajectories = (*trajectories[: mixed.place], mixed.trajectory, *trajectories[mixed.place + 1 :])
         iterations += mixed.evaluations
     clock("recombine")
-    samples = np.concatenate([predicted, optimised])  # (d) combine and correct
-    window, log_c = _correction(hand, predicted, optimised, settings, interval)
+    window, log_c = correct(
+        predicted, optimised, noise_scale(hand, settings, interval), settings
+    )  # (d) combine, correct
     clock("correct")
-    energy, golden_energy, overlap = _judge(problem, samples)
-    log_likelihood = _log_likelihood(energy, golden_energy, settings)
-    log_weights = normalise(log_c + log_likelihood + _log_prior(origins, settings))  # (e) weigh
+    judged = judge(problem, np.concatenate([predicted, optimised]))
+    likelihood = log_likelihood(judged, settings, settings.sigma2)
+    log_weights = normalise(log_c + likelihood + _log_prior(origins, settings))  # (e) weigh
     clock("weigh")
-    estimate = weighted_mean(samples, log_weights)  # (f) estimate
-    judged = _judge(problem, estimate[None])
-    estimate_energy, estimate_golden, estimate_overlap = (float(part[0]) for part in judged)
-    estimate_log_likelihood = float(_log_likelihood(judged[0], judged[1], settings)[0])
-    clock("estimate")
     before[jumped] = optimised[jumped]  # a jump is no motion
-    velocities = (samples - np.concatenate([before, before])) / interval
-    new = State(ParticleSet(samples, velocities, log_weights), state.reference, estimate, observation.time)
-    count = len(predicted)
-    info = StepInfo(
-        state.reference, ancestors, origins, predicted, optimised, energy[:count], energy[count:], golden_energy, overlap,
-        log_likelihood, log_c, log_weights, ess(log_weights), float(np.exp(log_weights[count:]).sum()), window,
-        estimate, estimate_golden, estimate_overlap, estimate_energy,
-        estimate_log_likelihood, trajectories,
-        iterations + screened + len(samples) + 1, clock.seconds,
+    samples = Samples(ancestors, origins, before, predicted, optimised, judged, likelihood, log_c, log_weights, window)
+    return conclude(  # (f) estimate
+        problem, settings.sigma2, state, interval, samples, clock,
+        evaluations=iterations + screened + len(log_weights), trajectories=trajectories,
     )  # fmt: skip
-    return recentred(new), info
 
 
 def _optimise(
@@ -199,38 +172,9 @@ def _recombined(
     return _Recombined(int(np.argmax(energies)), int(np.argmin(energies)), pose, trajectory, evaluations)
 
 
-def _correction(
-    hand: Hand, predicted: Array, optimised: Array, settings: SpfSettings, interval: float
-) -> tuple[float, Array]:
-    """Window h and log c (32) of the predicted, then the optimised samples."""
-    noise = noise_scale(hand, settings, interval)
-    white, white_optimised = predicted / noise, optimised / noise
-    rules: dict[str, Callable[[Array], float]] = {"paper": paper_window, "silverman": silverman_window}
-    window = settings.h if settings.window_rule == "fixed" else max(rules[settings.window_rule](white), 1e-6)
-    if not settings.correction:
-        return window, np.zeros(2 * len(predicted))
-    return window, log_correction(white, white_optimised, window)
-
-
-def _log_likelihood(energy: Array, golden_energy: Array, settings: SpfSettings) -> Array:
-    """log p(z|s) = -E/σ² (6), E joined by the rendered comparison; up to a constant."""
-    return -(energy + settings.golden * settings.points * golden_energy) / settings.sigma2
-
-
 def _log_prior(origins: tuple[str, ...], settings: SpfSettings) -> Array:
     """Log-prior of the predicted, then the optimised samples; -inf for predicted ones that are not kept."""
     predicted = np.zeros(len(origins)) if settings.keep_predicted else np.full(len(origins), -np.inf)
     predicted[settings.n :] += math.log(settings.learned_prior)
     optimised = np.array([math.log(settings.learned_prior) if origin == "learned" else 0.0 for origin in origins])
     return np.concatenate([predicted, optimised])
-
-
-def _judge(problem: Problem, poses: Array) -> tuple[Array, Array, Array]:
-    """E, golden energy and overlap of poses, in parallel."""
-
-    def run(chunk: Array) -> tuple[Array, Array, Array]:
-        return costs(problem, chunk), *golden(problem, chunk)
-
-    parts = map_threads(run, [chunk for chunk in np.array_split(poses, 2) if len(chunk)])
-    energy, golden_energy, overlap = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    return energy, golden_energy, overlap

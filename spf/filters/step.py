@@ -14,7 +14,7 @@ from spf.hand.kinematics import angles_of, rotation_about
 from spf.hand.model import Hand
 from spf.optimisers.trajectory import Trajectory
 
-__all__ = ["Clock", "State", "StepInfo", "recentred", "start_at"]
+__all__ = ["Clock", "Layer", "State", "StepInfo", "recentred", "start_at"]
 
 Array = NDArray[np.float64]
 
@@ -35,6 +35,20 @@ class State(NamedTuple):
     time: float
 
 
+class Layer(NamedTuple):
+    """A layer of an annealed filter.
+
+    Attributes:
+        exponent: β, of the weights.
+        survival: α, the share of the particles that survives.
+        spread: standard deviation of the noise before this layer, relative to the process noise.
+    """
+
+    exponent: float
+    survival: float
+    spread: float
+
+
 class StepInfo(NamedTuple):
     """Everything that happened in a frame: all that a view may read besides the state.
 
@@ -48,8 +62,8 @@ class StepInfo(NamedTuple):
             a recombination of the others, whose trajectory starts there and not at the predicted sample.
         predicted, optimised: (N, D) and (M, D).
         cost_before, cost_after: (N,) and (M,) E of the predicted and of the optimised samples.
-        golden: (N + M,) rendered comparison.
-        overlap: (N + M,) silhouette overlap.
+        golden: (N + M,) rendered comparison; nan where it was left out.
+        overlap: (N + M,) silhouette overlap; nan where it was left out.
         log_likelihood: (N + M,).
         log_correction: (N + M,) log c (32); zeros when nothing is corrected.
         log_weights: (N + M,) normalised; -inf for samples that are not kept.
@@ -58,9 +72,10 @@ class StepInfo(NamedTuple):
         window: h that was used; nan when there is no kernel density estimate.
         estimate: (D,) pose, relative to ``reference``.
         estimate_golden, estimate_overlap, estimate_cost, estimate_log_likelihood: of the estimate.
-        trajectories: M trajectories of the optimiser, or () when not recorded.
+        trajectories: M paths from a predicted to its optimised sample, or () when not recorded.
         evaluations: cost evaluations in the frame.
         timings: seconds by stage.
+        layers: of an annealed filter; () in others.
     """
 
     reference: Array
@@ -86,6 +101,7 @@ class StepInfo(NamedTuple):
     trajectories: tuple[Trajectory, ...]
     evaluations: int
     timings: dict[str, float]
+    layers: tuple[Layer, ...] = ()
 
     @property
     def predicted_weights(self) -> Array:

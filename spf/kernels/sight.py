@@ -15,7 +15,7 @@ from spf.kernels.kinematics import Chain, Skeleton, pose_bones
 from spf.kernels.render import FAR, project_skin, rasterise
 from spf.kernels.skinning import Skin, carry
 
-__all__ = ["Sight", "make_sight", "match_pixels", "see", "visible_vertices"]
+__all__ = ["Sight", "keep_first", "make_sight", "match_pixels", "see", "visible_vertices"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -37,12 +37,14 @@ class Sight(NamedTuple):
             normal, and ‖x‖².
         coarse: (P, 3) float32 the projected proxy.
         depth: (h, w) float32 z-buffer.
+        chosen: (V,) marks of visible vertices.
     """
 
     visible: NDArray[np.int32]
     near: Image
     coarse: Image
     depth: Image
+    chosen: NDArray[np.uint8]
 
 
 @allocating
@@ -53,6 +55,7 @@ def make_sight(vertices: int, proxy_vertices: int, height: int, width: int) -> S
         np.zeros((_NEAR_ROWS, vertices), np.float32),
         np.zeros((proxy_vertices, 3), np.float32),
         np.zeros((height, width), np.float32),
+        np.zeros(vertices, np.uint8),
     )
 
 
@@ -113,6 +116,26 @@ def see(
     else:
         depth[:] = FAR
     return visible_vertices(surface, chain.bones, pose, obs.grid_camera, depth, _BEHIND, sight.visible, sight.near)
+
+
+@part
+def keep_first(sight: Sight, count: int, order: NDArray[np.int32], most: int) -> int:
+    """Keep of the visible vertices the first ones in an order (V,) of all vertices, at most so many; returns how many.
+
+    The same order gives similar poses nearly the same vertices: what they are compared on is common to all particles.
+    """
+    visible, chosen = sight.visible, sight.chosen
+    for c in range(count):
+        chosen[index(visible[c])] = 1
+    kept = 0
+    for o in range(order.shape[0]):
+        i = index(order[o])
+        if chosen[i] == 1:
+            chosen[i] = 0
+            if kept < most:
+                visible[kept] = order[o]
+                kept += 1
+    return kept
 
 
 @kernel

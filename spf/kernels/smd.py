@@ -15,7 +15,7 @@ from spf.kernels.compiling import allocating, index, kernel, part, strict_kernel
 from spf.kernels.cost import CostWeights, ObservationArrays, Spheres, Workspace, cost_products
 from spf.kernels.curvature import gauss_newton_diagonal
 from spf.kernels.kinematics import Skeleton
-from spf.kernels.sight import Sight, match_pixels, see
+from spf.kernels.sight import Sight, keep_first, match_pixels, see
 from spf.kernels.skinning import Skin
 
 __all__ = ["Scratch", "SmdParameters", "evaluate_poses", "make_scratch", "smd_run", "smd_update"]
@@ -140,14 +140,20 @@ def make_scratch(dofs: int, points: int, data_points: int, pool: int, work: Work
 def evaluate_poses(
     skeleton: Skeleton, surface: Skin, proxy: Skin, proxy_faces: NDArray[np.int32], spheres: Spheres,
     obs: ObservationArrays, weights: CostWeights, zbuffer: bool, match_radius: float,
-    poses: Array, reference: Array, data_pool: NDArray[np.int32], scratch: Scratch, energies: Array,
+    poses: Array, reference: Array, data_pool: NDArray[np.int32], order: NDArray[np.int32], points: int,
+    scratch: Scratch, energies: Array,
 ) -> None:  # fmt: skip
-    """E of many poses (N, D) on all their visible vertices and the same observed pixels, without the prior's pull."""
+    """E of many poses (N, D) on their visible vertices and the same observed pixels, without the prior's pull.
+
+    Of the visible vertices, the first ``points`` in the order (V,) are used; all of them when the order is empty.
+    """
     work, sight, matches, zeros = scratch.work, scratch.sight, scratch.pool_matches, scratch.zeros
     gradient, product = scratch.gradient, scratch.product
     for n in range(poses.shape[0]):
         count = see(skeleton, surface, proxy, proxy_faces, obs, poses[n], reference, zbuffer, work.chain, sight)
         match_pixels(sight, count, obs, work.chain, poses[n], data_pool, match_radius, matches)
+        if order.shape[0] > 0:
+            count = keep_first(sight, count, order, points)
         energies[n] = cost_products(
             skeleton, surface, spheres, obs, weights, zeros, zeros,
             poses[n], reference, sight.visible[:count], data_pool, matches, zeros, gradient, product, work,

@@ -12,36 +12,42 @@ from spf.kernels.smd import SmdParameters, smd_run
 from spf.optimisers.trajectory import Trajectory
 from spf.settings import Settings, setting
 
-__all__ = ["SmdSettings", "optimise"]
+__all__ = ["DescentSettings", "SmdSettings", "optimise"]
 
 Array = NDArray[np.float64]
-_SMD = "Stochastic meta-descent"
+_SMD, _DESCENT = "Stochastic meta-descent", "Descent"
 # Longest step of an entry in one iteration, and least curvature that its a₀ is computed with.
 _BOUND_TRANSLATION, _BOUND_PALM, _BOUND_DIGIT = 0.006, 0.1, 0.2
 
 
 @dataclasses.dataclass(frozen=True)
-class SmdSettings(Settings):
-    """How a particle descends."""
+class DescentSettings(Settings):
+    """How far and how often a descent on stochastic samples steps."""
 
-    mu: float = setting(0.02, "meta-step size of the step-size adaptation", group=_SMD, low=0.0, high=1.0, symbol="μ")
-    decay: float = setting(0.9, "decay of the gradient trace", group=_SMD, low=0.0, high=1.0, symbol="λ")
     initial_step: float = setting(
         0.4,
         "first step size, relative to the inverse Gauss-Newton curvature",
-        group=_SMD,
+        group=_DESCENT,
         low=1e-4,
         high=2.0,
         symbol="a₀",
     )
+    rounds: int = setting(10, "times that visibility and matches are refreshed", group=_DESCENT, low=1, high=100)
+    iterations: int = setting(10, "iterations between two refreshes", group=_DESCENT, low=1, high=200)
+    anneal: bool = setting(True, "bound a/a₀ by a falling factor over the second half", group=_DESCENT)
+    tolerance: float = setting(
+        0.0, "relative change of E between rounds under which a run ends", group=_DESCENT, low=0.0, high=1.0
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class SmdSettings(DescentSettings):
+    """How the step sizes of a particle's descent adapt."""
+
+    mu: float = setting(0.02, "meta-step size of the step-size adaptation", group=_SMD, low=0.0, high=1.0, symbol="μ")
+    decay: float = setting(0.9, "decay of the gradient trace", group=_SMD, low=0.0, high=1.0, symbol="λ")
     least_step: float = setting(0.1, "lower bound of a/a₀", group=_SMD, low=1e-4, high=1.0)
     most_step: float = setting(5.0, "upper bound of a/a₀", group=_SMD, low=1.0, high=100.0)
-    rounds: int = setting(10, "times that visibility and matches are refreshed", group=_SMD, low=1, high=100)
-    iterations: int = setting(10, "iterations between two refreshes", group=_SMD, low=1, high=200)
-    anneal: bool = setting(True, "bound a/a₀ by a falling factor over the second half", group=_SMD)
-    tolerance: float = setting(
-        0.0, "relative change of E between rounds under which a run ends", group=_SMD, low=0.0, high=1.0
-    )
 
 
 def optimise(
