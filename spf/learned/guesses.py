@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 #: Sides of the cubes, m, that show hands of 0.6 to 1.7 times the bundled mesh well enough for a first look.
 EXTENTS: tuple[float, ...] = (0.16, 0.22, 0.30, 0.41)
 
+_SCALES = (0.5, 2.0)  # of people's hands and what data sets make of them
 _SURENESS = 10.0  # nats by which joints that are sure to a fraction 1/e of the distance outweigh others
 _MIRROR = np.array([-1.0, 1.0, 1.0])
 _SIDES: tuple[Side, Side] = ("right", "left")
@@ -81,17 +82,27 @@ def guesses(
     """
     sizes = np.atleast_1d(np.asarray(extents, dtype=np.float64))
     centres = np.tile(np.asarray(centre, dtype=np.float64), (len(sizes), 1))
-    crops, turns = make_crops(depth, camera, centres, sizes)
-    outputs = network.outputs(np.concatenate([crops, crops[:, :, ::-1]]))
-    straight, mirrored = outputs[: len(sizes)], outputs[len(sizes) :]
-    rightness = 0.5 * (straight[:, layout.RIGHT] - mirrored[:, layout.RIGHT])
+    found = _look(network, depth, camera, centres, sizes, sides)
+    return sorted((guess for group in found for guess in group), key=lambda guess: -guess.log_weight)
+
+
+def _look(
+    network: Network, depth: NDArray[np.float32], camera: Camera, centres: Array, extents: Array, sides: Sequence[Side]
+) -> list[list[Guess]]:
+    """Return the guesses of each cube, the best first."""
+    crops, turns = make_crops(depth, camera, centres, extents)
+    views = [crops if side == "right" else crops[:, :, ::-1] for side in sides]
+    outputs = network.outputs(np.concatenate(views)).reshape(len(sides), len(crops), layout.OUTPUTS)
+    # log odds of a right hand in either view: half their difference is the evidence, and what is usual cancels
+    evidence = 0.5 * outputs[:, :, layout.RIGHT]
+    log_sides = evidence - np.logaddexp.reduce(evidence, axis=0) if len(sides) > 1 else np.zeros_like(evidence)
     found = []
-    for n, (size, turn) in enumerate(zip(sizes, turns, strict=True)):
-        for side in sides:
-            log_side = -np.logaddexp(0.0, -rightness[n] if side == "right" else rightness[n])
-            numbers = straight[n] if side == "right" else mirrored[n]
-            found += decode(numbers, side, np.asarray(centre, dtype=np.float64), float(size), turn, float(log_side))
-    return sorted(found, key=lambda guess: -guess.log_weight)
+    for n, (centre, extent, turn) in enumerate(zip(centres, extents, turns, strict=True)):
+        group: list[Guess] = []
+        for side, numbers, log_side in zip(sides, outputs[:, n], log_sides[:, n], strict=True):
+            group += decode(numbers, side, centre, float(extent), turn, float(log_side))
+        found.append(sorted(group, key=lambda guess: -guess.log_weight))
+    return found
 
 
 def decode(numbers: Array, side: Side, centre: Array, extent: float, turn: Array, log_side: float) -> list[Guess]:
@@ -118,7 +129,7 @@ def decode(numbers: Array, side: Side, centre: Array, extent: float, turn: Array
         pose = np.zeros(len(DOF_NAMES))
         pose[list(layout.ARTICULATED)] = row[layout.ANGLES]
         pose = load_hand(side).constrain(pose)
-        pose[:3], reference = _placed(load_hand(side).scaled(scale), pose, points, sigma)
+        pose[:3], reference = _placed(load_hand(side), scale, pose, points, sigma)
         found.append(
             Guess(
                 side=side,
@@ -134,7 +145,7 @@ def decode(numbers: Array, side: Side, centre: Array, extent: float, turn: Array
     return found
 
 
-def _placed(hand: Hand, pose: Array, points: Array, sigma: Array) -> tuple[Array, Array]:
+def _placed(hand: Hand, scale: float, pose: Array, points: Array, sigma: Array) -> tuple[Array, Array]:
     """Place a hand with bent fingers where the predicted points are (Kabsch 1976).
 
     The rotation R and translation t that minimise Σ w ‖R a + t − x‖² with w = 1/σ², over the 21 joints and the palm's
@@ -142,7 +153,8 @@ def _placed(hand: Hand, pose: Array, points: Array, sigma: Array) -> tuple[Array
     are therefore only taught, because they help it to see.
 
     Args:
-        hand: of the predicted size.
+        hand: the bundled hand.
+        scale: its predicted size.
         pose: (26,) with its fingers; the palm's entries are not used.
         points: (22, 3) m, predicted joints and palm's centre.
         sigma: (22,) m, of them.
@@ -150,7 +162,8 @@ def _placed(hand: Hand, pose: Array, points: Array, sigma: Array) -> tuple[Array
     Returns:
         t (3,), m, and R (3, 3).
     """
-    own = np.concatenate([joints_of(hand, np.concatenate([np.zeros(6), pose[6:]])), np.zeros((1, 3))])
+    own = np.zeros((len(points), 3))
+    own[:-1] = scale * joints_of(hand, np.concatenate([np.zeros(6), pose[6:]]))
     weights = sigma**-2.0 / np.sum(sigma**-2.0)
     middle, target = weights @ own, weights @ points
     spread = (points - target).T @ ((own - middle) * weights[:, None])
@@ -183,12 +196,14 @@ def search_hand(
     Returns:
         the guesses of the last look at each of the first look's cubes, the best first.
     """
-    cubes = [(np.asarray(centre, dtype=np.float64), e) for e in (EXTENTS if scale is None else (extent_of(scale),))]
+    extents = np.array(EXTENTS if scale is None else [extent_of(scale)])
+    centres = np.tile(np.asarray(centre, dtype=np.float64), (len(extents), 1))
     found: list[list[Guess]] = []
     for _ in range(rounds):
-        found = [guesses(network, depth, camera, middle, extent, sides) for middle, extent in cubes]
+        found = _look(network, depth, camera, centres, extents, sides)
         bests = [group[0] for group in found]
-        cubes = [(best.joints.mean(axis=0), extent_of(scale or float(np.clip(best.scale, 0.5, 2.0)))) for best in bests]
+        centres = np.array([best.joints.mean(axis=0) for best in bests])
+        extents = np.array([extent_of(scale or float(np.clip(best.scale, *_SCALES))) for best in bests])
     return sorted((guess for group in found for guess in group), key=_believability, reverse=True)
 
 

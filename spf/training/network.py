@@ -11,7 +11,7 @@ from spf.learned import layout
 __all__ = ["HandNetwork", "Losses", "loss_of", "rotation_of"]
 
 _OTHERS = 0.05  # weight of the hypotheses that did not win
-_ROTATION, _ANGLES, _SIZE, _CHOICE, _TOGETHER = 1.0, 4.0, 1.0, 0.3, 4.0  # weights against the points' likelihood
+_ROTATION, _ANGLES, _SIZE, _CHOICE, _TOGETHER, _SIDE = 1.0, 4.0, 1.0, 0.3, 4.0, 3.0  # against the points' likelihood
 _ANGLE_KNEE = 0.1  # rad under which the error of an angle counts squared
 _LOG_SPREAD_RANGE = (-6.0, 0.0)
 
@@ -111,7 +111,7 @@ def loss_of(outputs: Tensor, batch: tuple[Tensor, ...]) -> Losses:
     winner = errors.mean(-1).gather(1, best[:, None])[:, 0]
     top = errors.mean(-1).gather(1, raw[..., layout.LOGIT].argmax(1)[:, None])[:, 0]
     return {
-        "loss": pose + presence + side,
+        "loss": pose + presence + _SIDE * side,
         "best": (winner * valid).sum() / count,
         "top": (top * valid).sum() / count,
         "angles": (bent.gather(1, best[:, None])[:, 0] * valid).sum() / count,

@@ -135,8 +135,8 @@ def _forearms(
     """Tapered tubes (n, W, 3) from inside the wrist, bent at it, short or long, with or without a sleeve."""
     n = len(shape)
     size = shapes.lengths[shape]
-    bend = rotations_about(0, np.radians(rng.normal(0.0, 24.0, n))) @ rotations_about(
-        1, np.radians(rng.normal(0.0, 11.0, n))
+    bend = rotations_about(0, np.radians(rng.normal(0.0, 30.0, n))) @ rotations_about(
+        1, np.radians(rng.normal(0.0, 13.0, n))
     )
     along = np.linspace(0.0, 1.0, _RINGS)
     length = np.where(rng.random(n) < 0.75, rng.uniform(0.9, 1.6, n), rng.uniform(0.05, 0.9, n)) * size
