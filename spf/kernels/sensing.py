@@ -69,48 +69,61 @@ def sense(clean: Image, focal: float, faults: Array, pools: Pools, start: int, s
         seen: (H, W) float32 the measured map, 0 where there is no reading.
     """
     height, width = clean.shape
-    mask = pools.normal.shape[0] - 1
-    ragged, flying, eroded, white, grainy, grain = faults[0], faults[1], faults[2], faults[3], faults[4], faults[5]
-    holes, hole_size, steepest, smooths, step = faults[6], faults[7], faults[8], faults[9], faults[10]
-    for v in range(height):
-        for u in range(width):
-            k = start + 2 * (v * width + u)
-            dv = int(np.floor(ragged * pools.normal[index(k & mask)] + 0.5))
-            du = int(np.floor(ragged * pools.normal[index((k + 1) & mask)] + 0.5))
-            row, column = min(max(v + dv, 0), height - 1), min(max(u + du, 0), width - 1)
-            spare[v, u] = clean[index(row), index(column)]
-    target = seen
+    _displace(clean, faults[0], pools.normal, start, spare)
     for v in range(height):
         for u in range(width):
             z = spare[v, u]
-            target[v, u] = _ZERO
-            if z == _ZERO:
-                continue
-            k = start + 7919 + v * width + u
-            chance = pools.uniform[index(k & mask)]
-            left, right = spare[v, max(u - 1, 0)], spare[v, min(u + 1, width - 1)]
-            above, below = spare[max(v - 1, 0), u], spare[min(v + 1, height - 1), u]
-            nearest, farthest = min(min(left, right), min(above, below)), max(max(left, right), max(above, below))
-            if farthest - z > _EDGE or nearest == _ZERO:
-                if chance < eroded:
-                    continue
-                if chance < eroded + flying:
-                    reach = max(farthest - z, _MADE_UP) if nearest == _ZERO else farthest - z
-                    z += pools.uniform[index((k + 31337) & mask)] * reach
-            elif max(farthest - z, z - nearest) * focal > steepest * z and chance < _LOST:
-                continue
-            if holes > 0.0 and _smooth_noise(pools.normal, start + 104729, v, u, hole_size) > holes:
-                continue
-            z += white * pools.normal[index((k + 50021) & mask)]
-            z += grainy * _smooth_noise(pools.normal, start + 200003, v, u, grain)
-            target[v, u] = z
-    if smooths > 0.0:
+            seen[v, u] = _reading(spare, v, u, focal, faults, pools, start) if z > _ZERO else _ZERO
+    if faults[9] > 0.0:
         _smooth(seen, spare)
+    step = faults[10]
     inverse = 1.0 / step
     for v in range(height):
         for u in range(width):
             if seen[v, u] > _ZERO:
                 seen[v, u] = np.floor(seen[v, u] * inverse + 0.5) * step
+
+
+@part
+def _displace(clean: Image, ragged: float, pool: Image, start: int, displaced: Image) -> None:
+    """Let every pixel read a little beside itself, ``ragged`` pixels on the average."""
+    height, width = clean.shape
+    mask = pool.shape[0] - 1
+    for v in range(height):
+        for u in range(width):
+            k = start + 2 * (v * width + u)
+            dv = int(np.floor(ragged * pool[index(k & mask)] + 0.5))
+            du = int(np.floor(ragged * pool[index((k + 1) & mask)] + 0.5))
+            row, column = min(max(v + dv, 0), height - 1), min(max(u + du, 0), width - 1)
+            displaced[v, u] = clean[index(row), index(column)]
+
+
+@part
+def _reading(depth: Image, v: int, u: int, focal: float, faults: Array, pools: Pools, start: int) -> float:
+    """What the sensor reads in one pixel with something in it: edges, steep surfaces, holes and noise; 0 for nothing."""
+    height, width = depth.shape
+    mask = pools.normal.shape[0] - 1
+    flying, eroded, white, grainy, grain = faults[1], faults[2], faults[3], faults[4], faults[5]
+    holes, hole_size, steepest = faults[6], faults[7], faults[8]
+    z = depth[v, u]
+    k = start + 7919 + v * width + u
+    chance = pools.uniform[index(k & mask)]
+    left, right = depth[v, max(u - 1, 0)], depth[v, min(u + 1, width - 1)]
+    above, below = depth[max(v - 1, 0), u], depth[min(v + 1, height - 1), u]
+    nearest, farthest = min(min(left, right), min(above, below)), max(max(left, right), max(above, below))
+    if farthest - z > _EDGE or nearest == _ZERO:
+        if chance < eroded:
+            return _ZERO
+        if chance < eroded + flying:
+            reach = max(farthest - z, _MADE_UP) if nearest == _ZERO else farthest - z
+            z += pools.uniform[index((k + 31337) & mask)] * reach
+    elif max(farthest - z, z - nearest) * focal > steepest * z and chance < _LOST:
+        return _ZERO
+    if holes > 0.0 and _smooth_noise(pools.normal, start + 104729, v, u, hole_size) > holes:
+        return _ZERO
+    z += white * pools.normal[index((k + 50021) & mask)]
+    z += grainy * _smooth_noise(pools.normal, start + 200003, v, u, grain)
+    return z
 
 
 @part

@@ -15,6 +15,9 @@ from spf.learned.network import Network, load_network
 from spf.synthetic import SyntheticSettings, synthesise
 from tests.scenes import FACING
 
+#: Median error of a single frame, m: measured 0.013-0.014 and 0.009 with the shipped weights.
+KNOWN_SIZE, UNKNOWN_SIZE = 0.018, 0.014
+
 CAMERA = Camera(320, 240, 230.0, 230.0, 160.0, 120.0)
 NOTHING = np.zeros((240, 320), np.float32)
 CENTRE = np.array([0.1, -0.05, 0.5])
@@ -129,7 +132,9 @@ class TestShippedNetwork:
             errors.append(np.linalg.norm(self.posed(best) - frame.truth.joints, axis=1).mean())
             scales.append(best.scale)
         assert np.median(errors) < UNKNOWN_SIZE
-        assert np.median(scales) == pytest.approx(0.7, rel=0.15)
+        assert np.median(scales) == pytest.approx(0.7, rel=0.12)
 
-
-KNOWN_SIZE, UNKNOWN_SIZE = 0.03, 0.03  # m
+    def test_it_sees_that_there_is_no_hand(self, network):
+        assert guesses(network, NOTHING, CAMERA, CENTRE, 0.25)[0].presence < 0.2
+        wall = np.full((240, 320), 0.52, np.float32)
+        assert guesses(network, wall, CAMERA, CENTRE, 0.25)[0].presence < 0.3
