@@ -30,6 +30,8 @@ from spf.synthetic import SyntheticSession, SyntheticSettings, synthesise
 
 __all__ = ["main"]
 
+FRAMES_BY_N = {1: 40, 4: 40, 16: 12, 64: 6, 256: 3}  # frames whose median is taken, for every number of particles
+
 
 def _best(work: Callable[[], object], repeats: int) -> float:
     """Least time of a piece of work, s, after one run to warm up."""
@@ -79,52 +81,74 @@ def measure() -> dict[str, Any]:
     frame, hand = session[0], session.hand
     assert frame.truth is not None
     assert frame.truth.pose is not None
-    place = frame.truth.pose[:3]
+    assert frame.truth.orientation is not None
+    pose, orientation = frame.truth.pose, frame.truth.orientation
+    place = pose[:3]
     observation = observe(frame, place, reach_of(hand))
     rng = np.random.default_rng(0)
     paper = smart.SpfSettings(points=45, coverage=0.0, data_points=0, collision=0.0)
     default = smart.SpfSettings()
-    bare = make_problem(hand, observation, paper, frame.truth.orientation, rng)
-    full = make_problem(hand, observation, default, frame.truth.orientation, rng)
-    poses = np.repeat(frame.truth.pose[None], 100, axis=0)
+    bare = make_problem(hand, observation, paper, orientation, rng)
+    full = make_problem(hand, observation, default, orientation, rng)
+    poses = np.repeat(pose[None], 100, axis=0)
     large_frame = large[0]
     assert large_frame.truth is not None
     assert large_frame.truth.pose is not None
     large_place = large_frame.truth.pose[:3]
-    whole, stages = _frame(session, default, 40)
-    return {
-        "smd_iteration_45_points": _iteration(bare, paper, frame.truth.pose),
-        "smd_iteration_default": _iteration(full, default, frame.truth.pose),
-        "particle": _best(lambda: optimise(full, default, np.random.default_rng(0), frame.truth.pose), 20),
+    figures = {
+        "smd_iteration_45_points": _iteration(bare, paper, pose),
+        "smd_iteration_default": _iteration(full, default, pose),
+        "particle": _best(lambda: optimise(full, default, np.random.default_rng(0), pose), 20),
         "golden_comparison": _best(lambda: golden(full, poses), 20) / len(poses),
         "observation_320x240": _best(lambda: observe(frame, place, reach_of(hand)), 20),
         "observation_640x480": _best(lambda: observe(large_frame, large_place, reach_of(large.hand)), 20),
-        "frame_n4": whole,
-        "stages_n4": stages,
-        "frame_by_n": {n: _frame(session, default.replace(n=n), 6)[0] for n in (1, 4, 16, 64, 256)},
-        "threads": threads(),
+    }
+    return {
+        **figures,
+        "frames": _scaling(session, default),
         "peak_memory_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
 
 
+def _scaling(session: SyntheticSession, settings: smart.SpfSettings) -> list[dict[str, Any]]:
+    """Time of a frame and of its stages, s, in all numbers of threads and of particles."""
+    rows = []
+    most = threads()
+    for count in range(1, most + 1):
+        os.environ["SPF_THREADS"] = str(count)
+        for n, frames in FRAMES_BY_N.items():
+            whole, stages = _frame(session, settings.replace(n=n), frames)
+            rows.append({"threads": count, "n": n, "frame": whole, "per_particle": whole / n, "stages": stages})
+    return rows
+
+
+def _table(figures: dict[str, Any]) -> str:
+    """Lay the figures out: the parts, then a row of milliseconds for every number of threads and particles."""
+    lines = [f"{'part':<26}{'µs':>11}"]
+    parts = {name: value for name, value in figures.items() if name not in ("frames", "peak_memory_mb")}
+    lines += [f"{name:<26}{1e6 * value:>11.1f}" for name, value in parts.items()]
+    stages = list(figures["frames"][0]["stages"])
+    lines += ["", "ms     threads    N    frame  a particle" + "".join(f"{name:>10}" for name in stages)]
+    for row in figures["frames"]:
+        cells = "".join(f"{1e3 * row['stages'][name]:>10.2f}" for name in stages)
+        lines.append(
+            f"{row['threads']:>14}{row['n']:>5}{1e3 * row['frame']:>9.2f}{1e3 * row['per_particle']:>12.2f}{cells}"
+        )
+    return "\n".join([*lines, "", f"peak memory {figures['peak_memory_mb']:.0f} MB"])
+
+
 def main() -> None:
-    """Print the table; write JSON when asked."""
+    """Print the tables and write JSON."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
-    parser.add_argument("--json", type=Path, help="write the figures here")
-    parser.add_argument("--threads", type=int, help="threads to use; all cores otherwise")
+    parser.add_argument("--json", type=Path, default=Path("benchmarks/results/speed.json"), help="file of the figures")
+    parser.add_argument("--threads", type=int, help="most threads to use; all cores otherwise")
     arguments = parser.parse_args()
     if arguments.threads:
         os.environ["SPF_THREADS"] = str(arguments.threads)
     figures = measure()
-    for name, value in figures.items():
-        if isinstance(value, dict):
-            print(f"{name}: " + ", ".join(f"{key} {1e3 * part:.2f} ms" for key, part in value.items()))
-        elif name in ("threads", "peak_memory_mb"):
-            print(f"{name}: {value:.0f}")
-        else:
-            print(f"{name}: {1e6 * value:.1f} µs" if value < 1e-3 else f"{name}: {1e3 * value:.2f} ms")
-    if arguments.json:
-        arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    print(_table(figures))
+    arguments.json.parent.mkdir(parents=True, exist_ok=True)
+    arguments.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

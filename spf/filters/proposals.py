@@ -17,7 +17,6 @@ from scipy.spatial.transform import Rotation
 from spf.cost.problem import Problem, golden
 from spf.hand.kinematics import angles_of, rotation_about
 from spf.hand.model import DIP_PER_PIP
-from spf.parallel import map_threads, threads
 from spf.settings import Settings, setting
 
 __all__ = ["ProposalSettings", "propose", "recombine"]
@@ -79,8 +78,7 @@ def propose(
     result, renders = predicted.copy(), 0
     for index in range(len(predicted) - count, len(predicted)):
         candidates = palm_changes(problem, predicted[index], estimate, settings.palm_proposals, rng)
-        parts = np.array_split(candidates, min(threads(), len(candidates)))
-        energies = np.concatenate(map_threads(lambda part: golden(problem, part)[0], parts))
+        energies, _ = golden(problem, candidates)
         pose, used = curl_digits(problem, candidates[int(np.argmin(energies))], float(energies.min()))
         result[index], renders = pose, renders + len(candidates) + used
     if settings.learned and problem.observation.suggestions:
