@@ -172,7 +172,9 @@ def test_a_bundled_session_is_tracked_and_tuned(page):
         assert after.std() > 5, f"{name} is blank"
         assert np.abs(after - before[name]).mean() > 0.5, f"{name} did not change"
     page.screenshot(path=ARTEFACTS / "stepped.png")
-    assert len(plotted(page, "before")) == len(plotted(page, "after")) == 8
+    particles = len(plotted(page, "before"))
+    assert particles in (8, 9)  # N, and the network's particle in the frames that it is asked in
+    assert len(plotted(page, "after")) == particles
     assert len(plotted(page, "ess")) == len(plotted(page, "golden")) == len(plotted(page, "error")) == 11
     assert sum(plotted(page, "predicted")) + sum(plotted(page, "optimised")) == pytest.approx(100)
 

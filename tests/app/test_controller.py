@@ -13,6 +13,7 @@ from spf.render import ViewCamera
 
 def started(state, controller, sample, act):
     state.change("rounds", 2)  # quick: what is tracked does not matter here
+    state.change("learned", False)  # N particles in every frame, none added by the network
     act(lambda: controller.open(sample), controller.start)
     assert state.error == ""
 
