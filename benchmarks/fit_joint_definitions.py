@@ -1,9 +1,10 @@
 """Fit what a data set's joints mean on the model: ``uv run python -m benchmarks.fit_joint_definitions SESSION|RUN …``.
 
 Takes recordings of one data set with truth, tracks each with the default tracker from an automatic start (or reads a
-run of ``spf track`` that is given in its place), and takes for each joint the median, over all frames that the hand was
-held in, of the truth minus the model's joint in its bone's frame, as a fraction of the hand's length. Writes it, with
-the date and how it was done, to ``spf/joint_definitions.json``. To be run once, on CVAR's P1, P4 and P5.
+run of ``spf track`` that is given in its place), and takes for each joint the geometric median, over all frames that the
+hand was held in, of the truth minus the model's joint in its bone's frame, as a fraction of the hand's length; each
+recording counts the same, however long it is. Writes it, with the date and how it was done, to
+``spf/joint_definitions.json``. To be run once, on CVAR's P1, P4 and P5.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from spf import __version__
 from spf.errors import SpfError
@@ -58,7 +60,7 @@ def main(arguments: list[str] | None = None) -> None:
     names = {item.session.joint_definition for item in tracked}
     if len(names) != 1 or not all(item.session.has_truth for item in tracked):
         parser.error(f"give recordings with truth of one data set, not of {', '.join(sorted(names))}")
-    offsets = np.nanmedian(np.concatenate([_offsets(item) for item in tracked]), axis=0)
+    offsets = _middle([_offsets(item) for item in tracked])
     for item in tracked:
         before, after = _errors(item, np.zeros_like(offsets)), _errors(item, offsets)
         raw, corrected = np.nanmean(before) * 1e3, np.nanmean(after) * 1e3
@@ -67,8 +69,9 @@ def main(arguments: list[str] | None = None) -> None:
         "fitted": datetime.date.today().isoformat(),
         "recordings": [item.session.name for item in tracked],
         "frames": [int((~item.track.lost).sum()) for item in tracked],
-        "how": "per joint, median over all held frames of truth minus model in the bone's frame, as a fraction of the "
-        f"hand's length; spf {__version__}, default tracker, start {options.init}, seed {options.seed}",
+        "how": "per joint, geometric median over held frames, each recording counting the same, of truth minus model in "
+        f"the bone's frame, as a fraction of the hand's length; spf {__version__}, default tracker, start {options.init}, "
+        f"seed {options.seed}",
         "offsets": {name: np.round(row, 5).tolist() for name, row in zip(JOINT_NAMES, offsets, strict=True)},
     }
     content = {**definitions(), names.pop(): entry}
@@ -99,6 +102,20 @@ def _offsets(item: _Tracked) -> Array:
             posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
             result[place] = relative_offsets(item.hand, posed, truth.joints)
     return result
+
+
+def _middle(offsets: list[Array]) -> Array:
+    """Geometric medians (21, 3) of offsets (N, 21, 3) of several recordings that count the same: the least mean error."""
+    result = np.empty(offsets[0].shape[1:])
+    for joint in range(len(result)):
+        own = [part[np.isfinite(part[:, joint]).all(axis=1), joint] for part in offsets]
+        first = np.median(np.concatenate(own), axis=0)
+        result[joint] = minimize(_mean_distance, first, args=(own,), method="Nelder-Mead").x
+    return result
+
+
+def _mean_distance(place: Array, recordings: list[Array]) -> float:
+    return float(np.mean([np.linalg.norm(points - place, axis=1).mean() for points in recordings]))
 
 
 def _errors(item: _Tracked, offsets: Array) -> Array:

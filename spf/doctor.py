@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from spf.errors import RenderUnavailableError
+from spf.learned.network import available_network
 from spf.render import probe_opengl
 
 __all__ = [
@@ -102,6 +103,14 @@ def check_numba(program: str = NUMBA_TRIAL, timeout: float = 120.0) -> Check:
     return Check("Compiled kernels", False, f"numba fails: {last}", advice)
 
 
+def check_network() -> Check:
+    """Return whether the learned proposal is there and runs."""
+    network, missing = available_network()
+    if network is None:
+        return Check("Learned proposal", False, "missing", missing)
+    return Check("Learned proposal", True, f"{network.about.get('samples_seen', 0) / 1e6:.1f} million samples")
+
+
 def check_opengl(timeout: float = 60.0) -> Check:
     """Return what draws three-dimensional pictures off-screen, tried in a child process: EGL, then OSMesa."""
     try:
@@ -154,6 +163,7 @@ def examine(sessions: Path | None = None) -> tuple[Check, ...]:
         *check_packages(),
         check_processor(),
         check_numba(),
+        check_network(),
         check_opengl(),
         check_sessions(sessions),
         check_browser(),

@@ -15,6 +15,7 @@ from spf import __version__
 from spf.errors import RunError, SpfError
 from spf.hand.pose_file import SavedPose
 from spf.initialise import Start
+from spf.learned.network import available_network
 from spf.sessions import Session
 from spf.settings import Settings
 from spf.trackers import TRACKERS
@@ -60,7 +61,7 @@ def manifest_of(plan: Plan, session: Session, camera_file: Path | None, command:
     Raises:
         SessionError: a frame cannot be read (for the session's fingerprint).
     """
-    start = plan.start
+    start, (network, _) = plan.start, available_network()
     saved = SavedPose(start.shape.side, start.pose, start.reference, start.frame, start.shape)
     return {
         "format": _FORMAT,
@@ -89,6 +90,7 @@ def manifest_of(plan: Plan, session: Session, camera_file: Path | None, command:
         "start": {"golden": start.golden, "margin": start.margin, "doubt": start.doubt, **saved.to_dict()},
         "platform": {"system": platform.platform(), "python": platform.python_version()},
         "packages": {name: version(name) for name in _PACKAGES},
+        "network": None if network is None else network.about.get("sha256"),
     }
 
 

@@ -114,3 +114,11 @@ def test_the_table_marks_what_works_what_is_optional_and_what_fails():
     text = doctor.table([Check("A", True, "1"), Check("Long", True, "none", "get it"), Check("B", False, "x", "do y")])
     assert text.splitlines() == ["ok    A     1", "note  Long  none: get it", "FAIL  B     x: do y"]
     assert doctor.table([]) == ""
+
+
+def test_a_missing_network_is_told_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert doctor.check_network().ok
+    monkeypatch.setattr(doctor, "available_network", lambda: (None, "The network is not there; install it."))
+    assert doctor.check_network() == Check(
+        "Learned proposal", False, "missing", "The network is not there; install it."
+    )

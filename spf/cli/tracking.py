@@ -26,6 +26,7 @@ from spf.errors import RunError, SettingError
 from spf.evaluate import count_losses
 from spf.hand import SavedPose, read_hand_shape, write_hand_shape, write_pose
 from spf.initialise import Start
+from spf.learned.network import available_network
 from spf.manifest import Plan, manifest_of
 from spf.prepare import prepare
 from spf.runs import RunWriter, check_free, read_run, reopen_session, track_plan
@@ -111,6 +112,7 @@ def track(
         spf track --repeat runs/b -o runs/c
     """
     check_free(output, force)
+    warn(available_network()[1])
     if repeat is not None:
         options: dict[str, Any] = {"--tracker": tracker, "--preset": preset, "--set": assignments, "--hand": hand}
         options |= {"--init": init, "--frames": frames, "--seed": seed, "--camera": camera}
@@ -144,7 +146,9 @@ def _plan_to_repeat(directory: Path, session: str | None) -> tuple[Session, Plan
     opened = reopen_session(run.manifest, session)
     stored = run.manifest["session"]["camera_file"]
     now = manifest_of(run.plan, opened, None, [])
-    changed = [name for name in ("spf_version", "packages", "platform") if now[name] != run.manifest[name]]
+    changed = [
+        name for name in ("spf_version", "packages", "platform", "network") if now[name] != run.manifest.get(name)
+    ]
     if changed:
         warn(f"the run was made with another {' and '.join(changed)}, so that the track may differ in its last digits.")
     return opened, run.plan, None if stored is None else Path(stored)
