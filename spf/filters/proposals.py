@@ -19,7 +19,7 @@ from spf.hand.kinematics import angles_of, rotation_about
 from spf.hand.model import DIP_PER_PIP
 from spf.settings import Settings, setting
 
-__all__ = ["ProposalSettings", "propose", "recombine"]
+__all__ = ["ProposalSettings", "origins_of", "recombine", "restructure", "with_suggestion"]
 
 Array = NDArray[np.float64]
 _PROPOSALS = "Proposals"
@@ -58,35 +58,37 @@ class ProposalSettings(Settings):
     )  # fmt: skip
 
 
-def propose(
-    problem: Problem, estimate: Array, predicted: Array, settings: ProposalSettings, rng: np.random.Generator
-) -> tuple[Array, tuple[str, ...], int]:
-    """Replace the last particles' predictions by structured proposals, and add the best of the suggested poses.
-
-    Args:
-        problem: the frame's cost; its render judges the proposals.
-        estimate: (D,) of the last frame.
-        predicted: (N, D) by the dynamics.
-        settings: how many.
-        rng: randomness.
+def with_suggestion(problem: Problem, predicted: Array, settings: ProposalSettings) -> tuple[Array, int]:
+    """Add the best of the frame's suggested poses to the predicted ones (N, D), judged by rendering.
 
     Returns:
-        (predicted (N, D), or (N + 1, D) with a suggestion; origin of each; number of renders).
+        (predicted (N, D), or (N + 1, D) with a suggestion; number of renders).
     """
-    count = int(settings.structured * len(predicted))
-    origins = ["dynamics"] * (len(predicted) - count) + ["structured"] * count
-    result, renders = predicted.copy(), 0
-    for index in range(len(predicted) - count, len(predicted)):
-        candidates = palm_changes(problem, predicted[index], estimate, settings.palm_proposals, rng)
-        energies, _ = golden(problem, candidates)
-        pose, used = curl_digits(problem, candidates[int(np.argmin(energies))], float(energies.min()))
-        result[index], renders = pose, renders + len(candidates) + used
-    if settings.learned and problem.observation.suggestions:
-        poses = _suggested(problem)
-        energies, _ = golden(problem, poses)
-        result, renders = np.concatenate([result, poses[[np.argmin(energies)]]]), renders + len(poses)
-        origins.append("learned")
-    return result, tuple(origins), renders
+    if not (settings.learned and problem.observation.suggestions):
+        return predicted, 0
+    poses = _suggested(problem)
+    energies, _ = golden(problem, poses)
+    return np.concatenate([predicted, poses[[np.argmin(energies)]]]), len(poses)
+
+
+def origins_of(count: int, total: int, settings: ProposalSettings) -> tuple[str, ...]:
+    """Say which proposal each of ``total`` particles is for: ``count`` of the filter's own, the last of them structured."""
+    structured = int(settings.structured * count)
+    return ("dynamics",) * (count - structured) + ("structured",) * structured + ("learned",) * (total - count)
+
+
+def restructure(
+    problem: Problem, estimate: Array, predicted: Array, settings: ProposalSettings, rng: np.random.Generator
+) -> tuple[Array, int]:
+    """Change a prediction (D,) to the best of the structured changes of it and of the last estimate (D,).
+
+    Returns:
+        (pose (D,), number of renders).
+    """
+    candidates = palm_changes(problem, predicted, estimate, settings.palm_proposals, rng)
+    energies, _ = golden(problem, candidates)
+    pose, used = curl_digits(problem, candidates[int(np.argmin(energies))], float(energies.min()))
+    return pose, len(candidates) + used
 
 
 def _suggested(problem: Problem) -> Array:

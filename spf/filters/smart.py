@@ -15,7 +15,7 @@ from spf.filters.estimate import Samples, conclude
 from spf.filters.kde import CorrectionSettings, correct
 from spf.filters.likelihood import LikelihoodSettings, judge, log_likelihood
 from spf.filters.particles import normalise
-from spf.filters.proposals import ProposalSettings, propose, recombine
+from spf.filters.proposals import ProposalSettings, origins_of, recombine, restructure, with_suggestion
 from spf.filters.resampling import ResamplingSettings, resample
 from spf.filters.step import Clock, State, StepInfo
 from spf.hand.model import Hand
@@ -79,16 +79,18 @@ def step(
     expected = drift(hand, before, state.particles.velocities[ancestors], interval, settings)
     predicted = predict(hand, expected, interval, settings, rng)  # (b) predict
     clock("predict")
-    predicted, origins, screened = propose(problem, state.estimate, predicted, settings, rng)
-    jumped = np.array([origin != "dynamics" for origin in origins])
+    predicted, screened = with_suggestion(problem, predicted, settings)
+    origins = origins_of(settings.n, len(predicted), settings)
+    clock("propose")
     added = len(predicted) - settings.n  # the network's particle, which has the heaviest sample for its ancestor
     ancestors = np.append(ancestors, np.full(added, np.argmax(state.particles.log_weights)))
     before, expected = state.particles.poses[ancestors], np.concatenate([expected, predicted[settings.n :]])
-    expected[jumped] = predicted[jumped]
-    clock("propose")
-    optimised, trajectories, iterations = _optimise(  # (c) optimise
-        problem, predicted, expected, settings, interval, rng, record, effort
+    descents = _descend(  # (c) optimise
+        problem, predicted, expected, origins, state.estimate, settings, interval, rng, record=record, effort=effort
     )
+    predicted, optimised = (np.stack([getattr(one, part) for one in descents]) for part in ("start", "end"))
+    trajectories = tuple(one.trajectory for one in descents if one.trajectory is not None)
+    evaluations = screened + sum(one.evaluations for one in descents)
     clock("optimise")
     mixed = _recombined(problem, optimised, settings, interval, rng, record)
     if mixed is not None:
@@ -96,7 +98,7 @@ def step(
         origins = (*origins[: mixed.place], "recombined", *origins[mixed.place + 1 :])
         if mixed.trajectory is not None:
             trajectories = (*trajectories[: mixed.place], mixed.trajectory, *trajectories[mixed.place + 1 :])
-        iterations += mixed.evaluations
+        evaluations += mixed.evaluations
     clock("recombine")
     window, log_c = correct(
         predicted, optimised, noise_scale(hand, settings, interval), settings
@@ -106,37 +108,55 @@ def step(
     likelihood = log_likelihood(judged, settings, settings.sigma2)
     log_weights = normalise(log_c + likelihood + _log_prior(origins, settings))  # (e) weigh
     clock("weigh")
+    jumped = np.array([origin in ("structured", "learned") for origin in origins])
     before[jumped] = optimised[jumped]  # a jump is no motion
     samples = Samples(ancestors, origins, before, predicted, optimised, judged, likelihood, log_c, log_weights, window)
     return conclude(  # (f) estimate
         problem, settings.sigma2, state, interval, samples, clock,
-        evaluations=iterations + screened + len(log_weights), trajectories=trajectories,
+        evaluations=evaluations + len(log_weights), trajectories=trajectories,
     )  # fmt: skip
 
 
-def _optimise(
+class _Descent(NamedTuple):
+    start: Array
+    end: Array
+    trajectory: Trajectory | None
+    evaluations: int
+
+
+def _descend(
     problem: Problem,
     predicted: Array,
     expected: Array,
+    origins: tuple[str, ...],
+    estimate: Array,
     settings: SpfSettings,
     interval: float,
     rng: np.random.Generator,
+    *,
     record: bool,
     effort: float,
-) -> tuple[Array, tuple[Trajectory, ...], int]:
-    """Run SMD from every predicted sample, independently and in parallel, pulled to what was expected without noise."""
+) -> list[_Descent]:
+    """Run SMD from every predicted sample, independently and in parallel, pulled to what was expected without noise.
+
+    A structured sample is changed first, in the same task.
+    """
     precision = _precision(problem.hand, settings, interval)
     streams = rng.spawn(len(predicted))
 
-    def run(index: int) -> tuple[Array, Trajectory | None, int]:
-        return optimise(
-            problem, settings, streams[index], predicted[index],
-            prior=expected[index], precision=precision, effort=effort, record=record,
-        )  # fmt: skip
+    def run(index: int) -> _Descent:
+        start, prior, renders = predicted[index], expected[index], 0
+        if origins[index] == "structured":
+            start, renders = restructure(problem, estimate, start, settings, streams[index])
+            prior = start
+        end, trajectory, iterations = optimise(
+            problem, settings, streams[index], start, prior=prior, precision=precision, effort=effort, record=record
+        )
+        return _Descent(start, end, trajectory, iterations + renders)
 
-    results = map_threads(run, range(len(predicted)))
-    traces = tuple(trace for _, trace, _ in results if trace is not None)
-    return np.stack([pose for pose, _, _ in results]), traces, sum(count for _, _, count in results)
+    longest_first = sorted(range(len(predicted)), key=lambda index: origins[index] != "structured")
+    done = dict(zip(longest_first, map_threads(run, longest_first), strict=True))
+    return [done[index] for index in range(len(predicted))]
 
 
 def _precision(hand: Hand, settings: SpfSettings, interval: float) -> Array:
