@@ -100,9 +100,8 @@ def step(
             trajectories = (*trajectories[: mixed.place], mixed.trajectory, *trajectories[mixed.place + 1 :])
         evaluations += mixed.evaluations
     clock("recombine")
-    window, log_c = correct(
-        predicted, optimised, noise_scale(hand, settings, interval), settings
-    )  # (d) combine, correct
+    scale = noise_scale(hand, settings, interval)
+    window, log_c = correct(predicted, optimised, scale, settings)  # (d) combine, correct
     clock("correct")
     judged = judge(problem, np.concatenate([predicted, optimised]))
     likelihood = log_likelihood(judged, settings, settings.sigma2)
