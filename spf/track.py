@@ -7,8 +7,8 @@ and the frame's index, so that any frame can be repeated, and a run is repeated 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from spf.learned.guesses import extent_of, guesses
 from spf.learned.network import Network, available_network
 from spf.locate import reach_of
 from spf.observation import Observation, Suggestion, observe
+from spf.parallel import map_threads
 from spf.recover import recover
 from spf.settings import Settings
 from spf.trackers import TRACKERS
@@ -153,10 +154,8 @@ def track_frame(
     if was_lost:
         state = _sought(tracking, state, frame, rng)
     searched = time.perf_counter()
-    observation = observe(frame, state.filter.estimate[:3], reach_of(tracking.hand))
+    observation = _look(tracking, state, frame)
     observed = time.perf_counter()
-    observation = _with_suggestions(tracking, state, frame, observation)
-    suggested = time.perf_counter()
     if observation.is_empty:
         state = state._replace(lost=True, missing=state.missing + 1)
         return state, _lost(tracking, state, frame, began)
@@ -169,7 +168,6 @@ def track_frame(
     timings = {
         "search": searched - began,
         "observe": observed - searched,
-        "suggest": suggested - observed,
         **info.timings,
     }
     seconds = time.perf_counter() - began
@@ -181,14 +179,24 @@ def track_frame(
     return new, result
 
 
-def _with_suggestions(tracking: Tracking, state: TrackState, frame: Frame, observation: Observation) -> Observation:
-    """Let the network look at where the hand was, if the tracker listens to it."""
-    if tracking.network is None or observation.is_empty or not getattr(tracking.settings, "learned", False):
-        return observation
+def _look(tracking: Tracking, state: TrackState, frame: Frame) -> Observation:
+    """Observe the surface around where the hand was, while the network looks at the same place."""
+    parts: list[Callable[[], Any]] = [
+        lambda: observe(frame, state.filter.estimate[:3], reach_of(tracking.hand)),
+        lambda: _suggestions(tracking, state, frame),
+    ]
+    observation, suggestions = map_threads(lambda part: part(), parts)
+    return observation._replace(suggestions=suggestions)  # type: ignore[no-any-return]
+
+
+def _suggestions(tracking: Tracking, state: TrackState, frame: Frame) -> tuple[Suggestion, ...]:
+    """Ask the network, if the tracker listens to it."""
+    if tracking.network is None or not getattr(tracking.settings, "learned", False):
+        return ()
     middle = joints_of(tracking.hand, state.filter.estimate, state.filter.reference).mean(axis=0)
     size = tracking.hand.length / load_hand(tracking.hand.side).length
     seen = guesses(tracking.network, frame.depth, frame.camera, middle, extent_of(size), (tracking.hand.side,))
-    return observation._replace(suggestions=tuple(Suggestion(guess.pose, guess.reference) for guess in seen))
+    return tuple(Suggestion(guess.pose, guess.reference) for guess in seen)
 
 
 def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.Generator) -> TrackState:

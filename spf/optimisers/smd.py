@@ -32,7 +32,7 @@ class DescentSettings(Settings):
         high=2.0,
         symbol="a₀",
     )
-    rounds: int = setting(10, "times that visibility and matches are refreshed", group=_DESCENT, low=1, high=100)
+    rounds: int = setting(8, "times that visibility and matches are refreshed", group=_DESCENT, low=1, high=100)
     iterations: int = setting(10, "iterations between two refreshes", group=_DESCENT, low=1, high=200)
     anneal: bool = setting(True, "bound a/a₀ by a falling factor over the second half", group=_DESCENT)
     tolerance: float = setting(

@@ -201,7 +201,8 @@ def test_a_run_ends_when_the_cost_stands_still(near_truth: tuple[Problem, np.nda
 
 def test_effort_scales_the_number_of_rounds(near_truth: tuple[Problem, np.ndarray]) -> None:
     problem, start = near_truth
-    _, _, iterations = optimise(problem, SmdSettings(), np.random.default_rng(7), start, effort=0.3)
+    settings = SmdSettings(rounds=10, iterations=10)
+    _, _, iterations = optimise(problem, settings, np.random.default_rng(7), start, effort=0.3)
     assert iterations == 30
 
 
