@@ -12,12 +12,12 @@ __all__ = ["COLUMNS", "table"]
 COLUMNS: dict[str, tuple[str, float, str]] = {
     "mean mm": ("mean_joint_error_mm", 1.0, ".1f"),
     "median mm": ("median_joint_error_mm", 1.0, ".1f"),
-    "fingertips mm": ("fingertip_error_mm", 1.0, ".1f"),
+    "tips mm": ("fingertip_error_mm", 1.0, ".1f"),
     "IoU": ("silhouette_iou", 1.0, ".2f"),
     "losses": ("losses", 1.0, ".1f"),
-    "frames lost": ("frames_lost", 1.0, ".0f"),
+    "lost": ("frames_lost", 1.0, ".0f"),
     "ms/frame": ("processor_seconds_per_frame_median", 1e3, ".0f"),
-    "evaluations/frame": ("evaluations_per_frame", 1.0, ".0f"),
+    "evals/frame": ("evaluations_per_frame", 1.0, ".0f"),
 }
 
 
