@@ -19,7 +19,7 @@ from spf.errors import StartError
 from spf.filters import smart
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
-from spf.hand.kinematics import angles_of, joints_of, rotation_about
+from spf.hand.kinematics import joints_of, relative_to_camera
 from spf.hand.model import Side, load_hand
 from spf.hand.shape import HandShape
 from spf.learned.network import available_network
@@ -178,7 +178,7 @@ def _best_followed(
             if not views:
                 continue
             sized, views, _ = fit_shape(views, hypothesis.shape, rng, iterations=4, refine=False)
-            fitted = _Hypothesis(sized, _relative_to_camera(views[0]), hypothesis.energy)
+            fitted = _Hypothesis(sized, relative_to_camera(views[0].pose, views[0].reference), hypothesis.energy)
         infos = _track(fitted, ahead, rng)
         energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
         if shape is None:
@@ -274,14 +274,7 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
         every = max(1, len(tracked) // _VIEWS)
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
         shape, views, energy = fit_shape(views, shape, rng, iterations=iterations, refine=refine_all)
-        pose = _relative_to_camera(views[0])
+        pose = relative_to_camera(views[0].pose, views[0].reference)
     shape, views, energy = size_by_render(views, shape, rng)
-    pose = _relative_to_camera(views[0])
+    pose = relative_to_camera(views[0].pose, views[0].reference)
     return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy))
-
-
-def _relative_to_camera(view: View) -> Array:
-    """A view's pose, with its palm's angles relative to the camera's axes."""
-    pose = view.pose.copy()
-    pose[3:6] = angles_of(rotation_about(pose[3:6]) @ view.reference)
-    return pose

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from spf.cost.spheres import digit_spheres
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
-from spf.hand.kinematics import angles_of, joints_of, rotation_about
+from spf.hand.kinematics import joints_of, relative_to_camera
 from spf.hand.model import Hand, load_hand
 from spf.initialise import Start
 from spf.kernels.cost import Spheres
@@ -203,8 +203,7 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     """Search for a lost hand; the state goes on from where it was when nothing better is found."""
     limit = min(_believable(state, tracking), 0.8 * state.golden)
     within = _NEAR + _STRIDE * state.missing
-    last = state.filter.estimate.copy()
-    last[3:6] = angles_of(rotation_about(last[3:6]) @ state.filter.reference)
+    last = relative_to_camera(state.filter.estimate, state.filter.reference)
     found = recover(frame, tracking.hand, limit, last, within, state.missing, rng)
     if found is None:
         return state

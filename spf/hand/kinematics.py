@@ -12,7 +12,16 @@ from spf.hand.model import Hand
 from spf.kernels.kinematics import Chain, bone_twists, joint_gradient, make_chain, pose_bones
 from spf.kernels.skinning import skin, skin_forces, skin_velocities
 
-__all__ = ["PosedHand", "angles_of", "joints_of", "pose_hand", "rotation_about", "skin_jvp", "skin_vjp"]
+__all__ = [
+    "PosedHand",
+    "angles_of",
+    "joints_of",
+    "pose_hand",
+    "relative_to_camera",
+    "rotation_about",
+    "skin_jvp",
+    "skin_vjp",
+]
 
 Array = NDArray[np.float64]
 
@@ -90,6 +99,13 @@ def rotation_about(angles: ArrayLike) -> Array:
     ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
     rz = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
     return rx @ ry @ rz
+
+
+def relative_to_camera(pose: Array, reference: Array) -> Array:
+    """Return a pose (D,) that is relative to R_ref (3, 3) as one whose palm's angles are relative to the camera's axes."""
+    turned = pose.copy()
+    turned[3:6] = angles_of(rotation_about(pose[3:6]) @ reference)
+    return turned
 
 
 def angles_of(rotation: Array) -> Array:
