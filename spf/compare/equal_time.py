@@ -16,7 +16,7 @@ from spf.trackers import TRACKERS, make_settings
 __all__ = ["FRAMES", "Share", "choose", "equalise", "reference"]
 
 FRAMES = 8  # tracked to measure a setting
-_TRIES = 3
+_TRIES = 5
 _NEAR = 0.1  # relative difference from the target that is near enough
 
 
@@ -65,7 +65,17 @@ def choose(info: SettingInfo, value: int, target: float, measure: Callable[[int]
 
 
 def _extrapolated(times: dict[int, float], target: float) -> float:
-    """Value at which the line through the last two times (through zero for one) reaches the target."""
+    """Value to try next: where the line through the last two times (through zero for one) reaches the target.
+
+    Between two times on both sides of the target it is half-way from that line's value to the middle: the line alone would
+    close in from one side only where time is no straight line.
+    """
+    under = {value: seconds for value, seconds in times.items() if seconds < target}
+    over = {value: seconds for value, seconds in times.items() if seconds >= target}
+    if under and over:
+        low, high = max(under, key=under.__getitem__), min(over, key=over.__getitem__)
+        line = low + (target - under[low]) / (over[high] - under[low]) * (high - low)
+        return 0.5 * line + 0.25 * (low + high)
     *before, (value, seconds) = times.items()
     if not before or before[-1][1] == seconds:
         return value * target / seconds

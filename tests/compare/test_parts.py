@@ -83,6 +83,13 @@ def test_a_setting_that_is_near_enough_is_not_measured_again() -> None:
     assert choose(info(), 10, 1.0, lambda value: 1.05) == (10, 1.05)
 
 
+def test_choosing_goes_on_between_two_times_on_both_sides_of_the_target() -> None:
+    """A time that grows slowly at first and fast later, as of a search that ends by itself: lines from one side miss."""
+    value, seconds = choose(info(), 90, 0.025, lambda value: 0.015 + 1e-9 * value**4)
+    assert abs(seconds - 0.025) <= 0.1 * 0.025
+    assert 48 < value < 64
+
+
 # ---- table and figure
 
 
