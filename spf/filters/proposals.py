@@ -105,18 +105,14 @@ def _suggested(problem: Problem) -> Array:
 
 def palm_changes(problem: Problem, predicted: Array, estimate: Array, count: int, rng: np.random.Generator) -> Array:
     """The prediction, fingers moved by one place to either side, and palms turned and shifted at random, (≤ count + 3, D)."""
-    changes = [predicted]
-    for direction in (1, -1):
-        changes.append(_shifted_fingers(problem, estimate, direction))
-    for _ in range(count):
-        pose = (estimate if rng.random() < 0.5 else predicted).copy()
-        axis = rng.normal(size=3)
-        pose[3:6] += axis / np.linalg.norm(axis) * rng.uniform(0.15, 0.6)
-        pose[:3] += rng.normal(scale=0.01, size=3)
-        if rng.random() < 0.5:
-            pose[6:] += rng.normal(scale=0.25, size=len(pose) - 6)
-        changes.append(pose)
-    return problem.hand.constrain(np.array(changes))
+    chosen = np.where(rng.random((count, 1)) < 0.5, estimate, predicted)
+    axes = rng.normal(size=(count, 3))
+    chosen[:, 3:6] += axes / np.linalg.norm(axes, axis=1, keepdims=True) * rng.uniform(0.15, 0.6, (count, 1))
+    chosen[:, :3] += rng.normal(scale=0.01, size=(count, 3))
+    bent = rng.random((count, 1)) < 0.5
+    chosen[:, 6:] += bent * rng.normal(scale=0.25, size=(count, len(predicted) - 6))
+    shifted = [_shifted_fingers(problem, estimate, direction) for direction in (1, -1)]
+    return problem.hand.constrain(np.concatenate([predicted[None], shifted, chosen]))
 
 
 def _shifted_fingers(problem: Problem, pose: Array, direction: int) -> Array:
