@@ -25,7 +25,7 @@ from spf.locate import reach_of
 from spf.observation import observe
 from spf.sessions import Session
 
-__all__ = ["SessionFrames", "fit_pose", "prepare"]
+__all__ = ["SessionFrames", "fit_pose", "prepare", "side_of"]
 
 Array = NDArray[np.float64]
 _KEPT = 64  # decoded frames that are kept: what one start looks at
@@ -155,7 +155,7 @@ def _from_truth(
         orientation = np.eye(3) if truth.orientation is None else truth.orientation
         return _judged(frame, exact, truth.pose, orientation, rng)
     if shape is None:
-        shape = _calibrated(session.side or _side_of(truth.joints), frames[position : position + _CALIBRATED], rng)
+        shape = _calibrated(session.side or side_of(truth.joints), frames[position : position + _CALIBRATED], rng)
     pose, reference = fit_pose(shape.hand(), truth.joints)
     return _judged(frame, shape, pose, reference, rng)
 
@@ -254,8 +254,8 @@ def _size_ratio(hand: Hand, joints: Array) -> float:
     return float(np.linalg.norm(joints[palm].std(axis=0)) / np.linalg.norm(own.std(axis=0)))
 
 
-def _side_of(joints: Array) -> Side:
-    """Side of the hand whose joints (21, 3) are given: the one that they are fitted by more closely."""
+def side_of(joints: Array) -> Side:
+    """Return the side of the hand whose joints (21, 3) are given: the one that they are fitted by more closely."""
     known = _known(joints)
 
     def misfit(side: Side) -> float:
