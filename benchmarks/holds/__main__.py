@@ -8,16 +8,15 @@ gross errors, losses, wrong sides and time, beside the bar that is asked. See do
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+from benchmarks.holds.layout import stamp
 from benchmarks.holds.sessions import KINDS, Source, recordings, synthetic
 from benchmarks.holds.table import lay_out, row_of, worst
 from benchmarks.holds.tracking import Asked, held
@@ -44,7 +43,7 @@ def main(arguments: list[str] | None = None) -> None:
     except SpfError as error:
         sys.exit(f"holds: {error}")
     print(lay_out(_rows(runs)))
-    print(f"\n{datetime.date.today().isoformat()}, commit {_commit()}; {' '.join(sys.argv[1:]) or 'all defaults'}")
+    print(f"\n{', commit '.join(stamp().values())}; {' '.join(sys.argv[1:]) or 'all defaults'}")
     print("\n".join(["", "Farthest above the floor:", *worst(runs, options.worst)]))
 
 
@@ -126,15 +125,9 @@ def _rows(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _write(options: argparse.Namespace, runs: list[dict[str, Any]]) -> None:
     said = {name: str(value) if isinstance(value, Path) else value for name, value in vars(options).items()}
-    content = {"date": datetime.date.today().isoformat(), "commit": _commit(), "options": said}
+    content = {**stamp(), "options": said}
     options.json.parent.mkdir(parents=True, exist_ok=True)
     options.json.write_text(json.dumps({**content, "rows": _rows(runs), "runs": runs}) + "\n", encoding="utf-8")
-
-
-def _commit() -> str:
-    """The checkout's commit, with a mark where files differ from it."""
-    told = subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True, check=False)
-    return told.stdout.strip() or "unknown"
 
 
 if __name__ == "__main__":

@@ -33,6 +33,7 @@ class Kind(NamedTuple):
         yaw: rad, the palm turned away from the sensor.
         clutter: what else is in the scene.
         away: whether the hand leaves in the middle and comes back.
+        turned: whether the palm is turned anyhow, and tipped and rolled far more than a hand held up is.
     """
 
     speed_mm: float
@@ -40,6 +41,7 @@ class Kind(NamedTuple):
     yaw: float = 0.0
     clutter: str = "forearm"
     away: bool = False
+    turned: bool = False
 
 
 KINDS: dict[str, Kind] = {
@@ -47,6 +49,7 @@ KINDS: dict[str, Kind] = {
     "medium": Kind(9.0, "hand and forearm, 9 mm a frame"),
     "fast": Kind(16.0, "hand and forearm, 16 mm a frame"),
     "back": Kind(9.0, "the back of the hand towards the sensor", yaw=np.pi),
+    "any_view": Kind(9.0, "the hand turned anyhow", turned=True),
     "body": Kind(9.0, "a person behind the hand", clutter="body"),
     "table": Kind(9.0, "over a table, seen from above", clutter="table"),
     "face": Kind(9.0, "a face beside and behind the hand", clutter="face"),
@@ -104,6 +107,9 @@ def session_settings(kind: str, number: int, frames: int) -> SyntheticSettings:
         motion=motion, sensor=sensor, shape=shape, clutter=chosen.clutter, frames=frames, speed_mm=chosen.speed_mm,
         yaw=chosen.yaw, side=str(rng.choice(["right", "left"])), seed=int(rng.integers(2**31)),
     )  # fmt: skip
+    if chosen.turned:
+        yaw, pitch, roll = rng.uniform(-1.0, 1.0, 3) * (np.pi, 0.7, 1.0)
+        settings = settings.replace(yaw=float(yaw), pitch=float(pitch), roll=float(roll))
     if not chosen.away:
         return settings
     return settings.replace(absent_from=frames // 2, absent_frames=max(5, frames // 8))

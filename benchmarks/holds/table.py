@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.holds.layout import markdown
 from spf.evaluate.losses import count_losses
 
 __all__ = ["Bar", "bar_of", "lay_out", "row_of", "worst"]
@@ -130,10 +131,7 @@ _COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {
 def lay_out(rows: Iterable[dict[str, Any]]) -> str:
     """Lay rows out as a Markdown table, its columns aligned."""
     cells = [list(_COLUMNS), *([make(row) for make in _COLUMNS.values()] for row in rows)]
-    widths = [max(len(line[column]) for line in cells) for column in range(len(_COLUMNS))]
-    lines = ["| " + " | ".join(f"{cell:<{w}}" for cell, w in zip(line, widths, strict=True)) + " |" for line in cells]
-    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
-    return "\n".join([lines[0], rule, *lines[1:]])
+    return markdown(cells)
 
 
 def worst(runs: Iterable[dict[str, Any]], most: int) -> list[str]:

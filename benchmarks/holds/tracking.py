@@ -8,16 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.holds.labels import as_labelled, hand_of_labels, true_side
 from benchmarks.holds.sessions import Source, open_source
 from spf.evaluate import agreement_with_depth
-from spf.evaluate.contradictions import CONTRADICTED, label_energy, labelled_hand
-from spf.evaluate.floor import floor_of, marked
-from spf.frame import JOINT_NAMES
+from spf.evaluate.contradictions import CONTRADICTED, label_energy
+from spf.evaluate.floor import floor_of
 from spf.hand.kinematics import joints_of
-from spf.hand.model import Hand
 from spf.initialise import Start, find_start
-from spf.joint_definitions import offsets_of
-from spf.prepare import SessionFrames, prepare, side_of
+from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession
 from spf.track import begin, track_frame
@@ -26,8 +24,6 @@ from spf.trackers import make_settings
 __all__ = ["Asked", "held"]
 
 Array = NDArray[np.float64]
-_SIDE_FRAMES = 7  # whose truth says the side of a recording's hand …
-_SIZE_FRAMES = 9  # … and its size
 
 
 class Asked(NamedTuple):
@@ -63,14 +59,14 @@ def held(source: Source, asked: Asked) -> list[dict[str, Any]]:
         start = prepare(session, init=asked.init, seed=source.seed, last=len(frames))
     shared = {
         "kind": source.kind, "number": source.number, "seed": source.seed, "session": session.name,
-        **_start_part(session, frames, start), "start_seconds": time.perf_counter() - began,
+        **_start_part(session, start), "start_seconds": time.perf_counter() - began,
     }  # fmt: skip
     shared |= _floor_part(session, frames, start)
     return [shared | {"n": count} | _tracked(session, frames, start, asked, count, source) for count in asked.counts]
 
 
-def _start_part(session: Session, frames: SessionFrames, start: Start) -> dict[str, Any]:
-    hand, side = start.shape.hand(), _true_side(session, frames)
+def _start_part(session: Session, start: Start) -> dict[str, Any]:
+    hand, side = start.shape.hand(), true_side(session)
     exact = session.hand.length if isinstance(session, SyntheticSession) else None
     return {
         "start_frame": start.frame, "start_golden": start.golden, "doubt": start.doubted,
@@ -80,34 +76,13 @@ def _start_part(session: Session, frames: SessionFrames, start: Start) -> dict[s
     }  # fmt: skip
 
 
-def _true_side(session: Session, frames: SessionFrames) -> str | None:
-    """Side of the hand: the session's, or the one that most of the true joints are fitted by."""
-    if session.side is not None or not session.has_truth:
-        return session.side
-    chosen = np.linspace(0, len(frames) - 1, _SIDE_FRAMES).astype(int)
-    truths = [session.truth(int(index)) for index in chosen]
-    rights = [side_of(truth.joints) == "right" for truth in truths if truth is not None]
-    return "right" if np.mean(rights) > 0.5 else "left"
-
-
-def _labelled(session: Session, frames: SessionFrames, side: str | None) -> Hand:
-    """The hand that the labels show: the exact one, or one that they size."""
-    if isinstance(session, SyntheticSession):
-        return session.hand
-    offsets = offsets_of(session.joint_definition)
-    chosen = np.linspace(0, len(frames) - 1, _SIZE_FRAMES).astype(int)
-    truths = [truth for index in chosen if (truth := session.truth(int(index))) is not None]
-    unmarked = np.zeros((len(JOINT_NAMES), 3)) if offsets is None else offsets
-    return labelled_hand("left" if side == "left" else "right", np.array([t.joints for t in truths]), unmarked)
-
-
 def _floor_part(session: Session, frames: SessionFrames, start: Start) -> dict[str, Any]:
     """Floors in mm by frame: of the hand that was found, and of the exact one where there is one; flagged labels."""
     if not session.has_truth:
         return {}
-    hand = _marked(session, start.shape.hand())
+    hand = as_labelled(session, start.shape.hand())
     exact = session.hand if isinstance(session, SyntheticSession) else None
-    labelled = _labelled(session, frames, _true_side(session, frames))
+    labelled = hand_of_labels(session)
     part: dict[str, list[Any]] = {"fitted_mm": [], "floor_mm": [], "exact_floor_mm": [], "label_golden": []}
     for frame in frames[start.frame :]:
         rng = np.random.default_rng([frame.index, 7])
@@ -127,7 +102,7 @@ def _tracked(
     """Track from a start; everything by frame, from the start's on."""
     settings = make_settings(asked.tracker, "default", {"n": str(count), **asked.changes})
     tracking, state = begin(asked.tracker, settings, start, source.seed, time=float(session.times[start.frame]))
-    hand = _marked(session, tracking.hand)
+    hand = as_labelled(session, tracking.hand)
     rows: dict[str, list[Any]] = {
         "error_mm": [], "largest_mm": [], "lost": [], "golden": [], "iou": [], "seconds": [], "cpu_seconds": []
     }  # fmt: skip
@@ -147,12 +122,6 @@ def _tracked(
         rows["error_mm"].append(None if errors is None else _mm(errors))
         rows["largest_mm"].append(None if errors is None else round(1e3 * float(np.nanmax(errors)), 3))
     return rows
-
-
-def _marked(session: Session, hand: Hand) -> Hand:
-    """The hand with the joints of the session's truth; the model's own where none were fitted for it."""
-    offsets = offsets_of(session.joint_definition) if session.has_truth else None
-    return marked(hand, np.zeros((len(JOINT_NAMES), 3)) if offsets is None else offsets)
 
 
 def _mm(errors: Array) -> float:
