@@ -58,7 +58,7 @@ def row_of(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
     errors = [_known(run["error_mm"]) for run in runs]
     frames, largest = np.concatenate(errors), np.concatenate([_known(run["largest_mm"]) for run in runs])
     means = [float(own.mean()) for own in errors if own.size]
-    good = [(_known(run["error_mm"], ~_flags(run)), _known(run.get("floor_mm"), ~_flags(run))) for run in runs]
+    good = [(_known(run["error_mm"], ~_flags(run)), _known(_floors(run), ~_flags(run))) for run in runs]
     lost = [count_losses(np.array(run["lost"], bool)) for run in runs]
     sides = [run["right_side"] for run in runs if run["right_side"] is not None]
     iou = np.concatenate([_known(run["iou"]) for run in runs])
@@ -66,8 +66,8 @@ def row_of(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "kind": runs[0]["kind"], "n": runs[0]["n"], "sessions": len(runs), "frames": sum(len(r["lost"]) for r in runs),
         "mean_mm": _mean(means), "spread_mm": float(np.std(means)) if means else None, "median_mm": _median(frames),
         "p95_mm": float(np.percentile(frames, 95)) if frames.size else None,
-        "floor_mm": _mean([_mean(_known(run.get("floor_mm"))) for run in runs]),
-        "exact_floor_mm": _mean([_mean(_known(run.get("exact_floor_mm"))) for run in runs]),
+        "floor_mm": _mean([_mean(_known(_floors(run))) for run in runs]),
+        "own_floor_mm": _mean([_mean(_known(run.get("floor_mm"))) for run in runs]),
         "fitted_mm": _mean([_mean(_known(run.get("fitted_mm"))) for run in runs]),
         "flagged": _mean(np.concatenate([_flags(run) for run in runs])) if frames.size else None,
         "unflagged_mean_mm": _mean([_mean(own) for own, _ in good]),
@@ -109,7 +109,7 @@ _COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {
     "median": lambda r: _number(r["median_mm"]),
     "95 %": lambda r: _number(r["p95_mm"]),
     "floor": lambda r: _number(r["floor_mm"]),
-    "exact": lambda r: _number(r["exact_floor_mm"]),
+    "own": lambda r: _number(r["own_floor_mm"]),
     "fit": lambda r: _number(r["fitted_mm"]),
     ">40 %": lambda r: _number(r["over_40"], 100.0),
     "all<20 %": lambda r: _number(r["all_joints_under"]["20"], 100.0, 0),
@@ -138,7 +138,7 @@ def worst(runs: Iterable[dict[str, Any]], most: int) -> list[str]:
     """Describe the runs that lie farthest above their floor, and where."""
     rated = []
     for run in runs:
-        errors, floors = _filled(run["error_mm"]), _filled(run.get("floor_mm") or [None] * len(run["error_mm"]))
+        errors, floors = _filled(run["error_mm"]), _filled(_floors(run) or [None] * len(run["error_mm"]))
         if np.isfinite(errors).any():
             above = errors - np.where(np.isfinite(floors), floors, 0.0)
             rated.append((float(np.nanmean(above)), run, errors))
@@ -169,6 +169,12 @@ def _spans(indices: list[int]) -> str:
             spans.append([index, index])
     shown = [f"{a}-{b}" if b > a else f"{a}" for a, b in spans[:8]]
     return (", ".join(shown) + (", …" if len(spans) > 8 else "")) or "none"
+
+
+def _floors(run: dict[str, Any]) -> list[float | None] | None:
+    """The exact hand's floors where there is one, else those of the hand that was found."""
+    exact: list[float | None] = run.get("exact_floor_mm") or []
+    return exact if any(value is not None for value in exact) else run.get("floor_mm")
 
 
 def _flags(run: dict[str, Any]) -> np.ndarray:
