@@ -12,7 +12,7 @@ from spf.errors import HandError
 from spf.kernels.cost import Workspace, cost_products
 from spf.kernels.curvature import gauss_newton_diagonal
 
-__all__ = ["Products", "Sample", "curvature", "products", "see"]
+__all__ = ["Products", "Sample", "curvature", "gauss_newton", "products", "see"]
 
 Array = NDArray[np.float64]
 
@@ -96,6 +96,13 @@ def curvature(problem: Problem, pose: ArrayLike, sample: Sample, *, precision: A
         p, problem.reference, *sample, diagonal, scratch_of(problem).work,
     )  # fmt: skip
     return diagonal
+
+
+def gauss_newton(problem: Problem, pose: ArrayLike, sample: Sample) -> Array:
+    """Return the Gauss-Newton Hessian (D, D) of the cost, of D products with unit vectors (22)."""
+    directions, work = np.eye(problem.hand.dofs), scratch_of(problem).work
+    matrix = np.array([products(problem, pose, direction, sample, work=work).product for direction in directions])
+    return np.asarray(0.5 * (matrix + matrix.T))
 
 
 def _checked(problem: Problem, pose: ArrayLike) -> Array:

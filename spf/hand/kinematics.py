@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from spf.errors import HandError
 from spf.hand.model import Hand
-from spf.kernels.kinematics import Chain, bone_twists, joint_gradient, make_chain, pose_bones
+from spf.kernels.kinematics import TWIST, Chain, bone_twists, joint_gradient, make_chain, pose_bones
 from spf.kernels.skinning import skin, skin_forces, skin_velocities
 
 __all__ = [
     "PosedHand",
     "angles_of",
+    "joint_jacobian",
     "joints_of",
     "pose_hand",
     "relative_to_camera",
@@ -89,6 +90,19 @@ def joints_of(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -
 def _place_joints(hand: Hand, frames: Array) -> Array:
     at = frames[hand.joint_bone]
     return np.einsum("jik,jk->ji", at[:, :, :3], hand.joint_offset) + at[:, :, 3]
+
+
+def joint_jacobian(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -> Array:
+    """Return the derivatives (21, 3, D) of the joints by the entries of the pose, m per m and per rad."""
+    _, chain = _chain(hand, pose, reference)
+    at = chain.bones[:, :TWIST].reshape(-1, 3, 4)[hand.joint_bone]
+    arms = np.einsum("jik,jk->ji", at[:, :, :3], hand.joint_offset) + at[:, :, 3]  # from the palm's centre
+    jacobian = np.empty((len(arms), 3, hand.dofs))
+    for entry, direction in enumerate(np.eye(hand.dofs)):
+        bone_twists(hand.skeleton, direction, chain)
+        twists = chain.bones[hand.joint_bone, TWIST : TWIST + 6]
+        jacobian[:, :, entry] = np.cross(twists[:, :3], arms) + twists[:, 3:] + direction[:3]
+    return jacobian
 
 
 def rotation_about(angles: ArrayLike) -> Array:

@@ -1,0 +1,74 @@
+"""How far off the estimate may be: the covariance of the posterior, from the weighted samples and the curvature under them.
+
+The filter's samples are a mixture: what they differ by, and around each a Gaussian that the cost's curvature gives (Laplace).
+With few particles one sample carries nearly all the weight, so that the second part is what says something:
+
+    Σ = Σ_n π_n (s_n − ŝ)(s_n − ŝ)ᵀ + (H/σ² + diag(1/q²))⁻¹
+
+H is the Gauss-Newton Hessian (22) at the estimate ŝ, σ² that of the likelihood (6), and q the process noise: what the depth
+does not see is known as well as the dynamics predict it over one frame. Left out are the rendered comparison, the calibration of
+the hand, and minima that no particle is in; one factor, fitted to synthetic sessions with exact truth, stands for these on the
+average, and does not make the estimate of a hand that is held wrongly uncertain.
+
+Nothing of this is computed in a step: it is asked for, of a frame's info, by whoever shows it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from spf.cost.problem import make_problem
+from spf.cost.products import gauss_newton, see
+from spf.filters.dynamics import noise_scale
+from spf.filters.smart import SpfSettings
+from spf.filters.step import StepInfo
+from spf.hand.kinematics import joint_jacobian
+from spf.hand.model import Hand
+from spf.observation import Observation
+
+__all__ = ["INFLATION", "Uncertainty", "uncertainty_of"]
+
+Array = NDArray[np.float64]
+
+#: Factor on the covariance, fitted by ``python -m benchmarks.holds.calibration``; see docs/evaluation.md.
+INFLATION = 1.0
+
+
+class Uncertainty(NamedTuple):
+    """How far off an estimate may be.
+
+    Attributes:
+        pose: (D, D) covariance of the estimate's entries, m and rad.
+        joints: (21, 3, 3) covariance of each joint's place, m².
+        deviation: (21,) m, root mean square distance that a joint is expected to be off by.
+    """
+
+    pose: Array
+    joints: Array
+    deviation: Array
+
+
+def uncertainty_of(
+    hand: Hand, observation: Observation, info: StepInfo, settings: SpfSettings, *, factor: float = INFLATION
+) -> Uncertainty:
+    """Say how far off the estimate of a frame may be.
+
+    Args:
+        hand: the calibrated hand.
+        observation: of the frame.
+        info: what happened in the frame.
+        settings: that the filter ran with.
+        factor: on the covariance; 1 for what the posterior itself says.
+    """
+    problem = make_problem(hand, observation, settings, info.reference, np.random.default_rng(0))
+    curvature = gauss_newton(problem, info.estimate, see(problem, info.estimate)) / settings.sigma2
+    within = np.linalg.inv(curvature + np.diag(noise_scale(hand, settings) ** -2))
+    apart = np.concatenate([info.predicted, info.optimised]) - info.estimate
+    between = np.einsum("n,ni,nj->ij", np.exp(info.log_weights), apart, apart)
+    pose = factor * (within + between)
+    jacobian = joint_jacobian(hand, info.estimate, info.reference)
+    joints = np.einsum("jai,ik,jbk->jab", jacobian, pose, jacobian)
+    return Uncertainty(pose, joints, np.sqrt(np.trace(joints, axis1=1, axis2=2)))
