@@ -21,7 +21,7 @@ from benchmarks.holds.sessions import KINDS, Source, recordings, synthetic
 from benchmarks.holds.table import lay_out, row_of, worst
 from benchmarks.holds.tracking import Asked, held
 from spf.errors import SpfError
-from spf.trackers import TRACKERS, make_settings
+from spf.trackers import PRESETS, TRACKERS, make_settings
 
 _QUICK = {"sessions": 3, "frames": 60, "seeds": 1}
 _FULL = {"sessions": 15, "frames": 120, "seeds": 5}
@@ -31,10 +31,16 @@ _USUAL = ("slow", "medium", "fast")
 def main(arguments: list[str] | None = None) -> None:
     """Track everything that is asked for, print the table and write the JSON."""
     options = _parse(arguments)
-    asked = Asked(options.tracker, tuple(options.n), dict(text.split("=", 1) for text in options.set), options.init)
+    asked = Asked(
+        options.tracker,
+        options.preset,
+        tuple(options.n),
+        dict(text.split("=", 1) for text in options.set),
+        options.init,
+    )
     runs: list[dict[str, Any]] = []
     try:
-        make_settings(asked.tracker, "default", asked.changes)
+        make_settings(asked.tracker, asked.preset, asked.changes)
         for done in _all_held(_sources(options), asked, options.jobs):
             runs += done
             _tell(done)
@@ -63,6 +69,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, help="seeds of each recording (5)")
     parser.add_argument("--n", type=int, nargs="+", default=[4, 8], help="numbers of particles (4 8)")
     parser.add_argument("--tracker", default="spf", choices=list(TRACKERS))
+    parser.add_argument("--preset", default="default", choices=list(PRESETS))
     parser.add_argument("--init", default="auto", choices=("auto", "truth"))
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="change a setting; repeatable")
     parser.add_argument("--jobs", type=int, default=1, help="processes; with more than one, each has one thread (1)")

@@ -13,7 +13,7 @@ from spf.evaluate.losses import count_losses
 __all__ = ["Bar", "bar_of", "lay_out", "row_of", "worst"]
 
 _LARGE_MM = 40.0
-_THRESHOLDS_MM = (10, 20, 30, 40)
+_CURVE_MM = range(81)  # thresholds of the success curve
 _GOOD_IOU = 0.7
 _SAME_AS_EIGHT_MM = 2.0  # by which fewer particles may be worse than eight
 
@@ -73,7 +73,7 @@ def row_of(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "unflagged_mean_mm": _mean([_mean(own) for own, _ in good]),
         "unflagged_floor_mm": _mean([_mean(own) for _, own in good]),
         "over_40": _mean(frames > _LARGE_MM),
-        "all_joints_under": {str(mm): _mean(largest < mm) for mm in _THRESHOLDS_MM},
+        "success_curve": [_mean(largest < mm) for mm in _CURVE_MM],
         "losses": sum(own.losses for own in lost), "frames_lost": sum(own.frames_lost for own in lost),
         "wrong_sides": None if not sides else sides.count(False),
         "size_error": _mean([abs(run["size_ratio"] - 1.0) for run in runs if run["size_ratio"] is not None]),
@@ -112,7 +112,7 @@ _COLUMNS: dict[str, Callable[[dict[str, Any]], str]] = {
     "own": lambda r: _number(r["own_floor_mm"]),
     "fit": lambda r: _number(r["fitted_mm"]),
     ">40 %": lambda r: _number(r["over_40"], 100.0),
-    "all<20 %": lambda r: _number(r["all_joints_under"]["20"], 100.0, 0),
+    "all<20 %": lambda r: _number(r["success_curve"][20], 100.0, 0),
     "flag %": lambda r: _number(r["flagged"], 100.0, 0),
     "unflagged": lambda r: _number(r["unflagged_mean_mm"]),
     "floor ": lambda r: _number(r["unflagged_floor_mm"]),

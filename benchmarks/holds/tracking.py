@@ -19,7 +19,7 @@ from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession
 from spf.track import begin, track_frame
-from spf.trackers import make_settings
+from spf.trackers import TRACKERS, make_settings
 
 __all__ = ["Asked", "held"]
 
@@ -30,13 +30,14 @@ class Asked(NamedTuple):
     """What to track with.
 
     Attributes:
-        tracker: by name.
+        tracker, preset: by name.
         counts: numbers of particles.
         changes: of its settings, name → text.
         init: "auto" or "truth".
     """
 
     tracker: str
+    preset: str
     counts: tuple[int, ...]
     changes: dict[str, str]
     init: str
@@ -100,7 +101,7 @@ def _tracked(
     session: Session, frames: SessionFrames, start: Start, asked: Asked, count: int, source: Source
 ) -> dict[str, Any]:
     """Track from a start; everything by frame, from the start's on."""
-    settings = make_settings(asked.tracker, "default", {"n": str(count), **asked.changes})
+    settings = make_settings(asked.tracker, asked.preset, _with_count(asked, count))
     tracking, state = begin(asked.tracker, settings, start, source.seed, time=float(session.times[start.frame]))
     hand = as_labelled(session, tracking.hand)
     rows: dict[str, list[Any]] = {
@@ -122,6 +123,12 @@ def _tracked(
         rows["error_mm"].append(None if errors is None else _mm(errors))
         rows["largest_mm"].append(None if errors is None else round(1e3 * float(np.nanmax(errors)), 3))
     return rows
+
+
+def _with_count(asked: Asked, count: int) -> dict[str, str]:
+    """The changes, and the number of particles where the tracker has any."""
+    known = {info.name for info in TRACKERS[asked.tracker].settings().describe()}
+    return ({"n": str(count)} if "n" in known else {}) | asked.changes
 
 
 def _mm(errors: Array) -> float:
