@@ -9,7 +9,7 @@ torch = pytest.importorskip("torch", reason="torch is not installed (dependency 
 
 from spf.hand.model import load_hand  # noqa: E402
 from spf.learned import layout  # noqa: E402
-from spf.learned.guesses import decode  # noqa: E402
+from spf.learned.guesses import Cubes, decode  # noqa: E402
 from spf.learned.network import load_network  # noqa: E402
 from spf.training.export import export_network  # noqa: E402
 from spf.training.generator import Generator  # noqa: E402
@@ -52,10 +52,9 @@ def test_the_loss_is_least_at_the_truth(generator):
 
 def test_training_and_use_read_the_numbers_alike(generator):
     batch = generator.batch(2, 8)
-    best = [
-        max(decode(row, "right", np.zeros(3), 1.0, np.eye(3), 0.0), key=lambda guess: guess.log_weight)
-        for row in perfect_outputs(batch).double().numpy()
-    ]
+    cubes = Cubes(np.zeros((8, 3)), np.ones(8), np.tile(np.eye(3), (8, 1, 1)))
+    groups = decode(perfect_outputs(batch).double().numpy(), "right", np.zeros(8), cubes)
+    best = [max(group, key=lambda guess: guess.log_weight) for group in groups]
     np.testing.assert_allclose([g.joints for g in best], batch.points[:, :21], atol=1e-5)
     # hands of other shapes than the bundled one are placed by the fit to their joints
     np.testing.assert_allclose([g.reference for g in best], batch.rotations, atol=0.15)
