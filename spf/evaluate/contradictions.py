@@ -67,7 +67,7 @@ def label_energy(hand: Hand, frame: Frame) -> float:
         frame: with truth; the exact pose is taken where the truth has one.
 
     Returns:
-        0 where the render explains all, 1 where nothing is seen where the labels are; nan without truth.
+        0 where the render explains all, 1 and more where it explains nothing; nan without truth.
 
     Raises:
         StartError: fewer than three joints of the palm are known.
