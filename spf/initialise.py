@@ -22,11 +22,11 @@ from spf.frame import Frame
 from spf.hand.kinematics import joints_of, relative_to_camera
 from spf.hand.model import Side, load_hand
 from spf.hand.shape import HandShape
-from spf.learned.network import available_network
-from spf.locate import locate, reach_of, suggested
+from spf.learned.network import Network, available_network
+from spf.locate import Seeds, locate, reach_of, strangeness, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings, size_penalty
-from spf.segmentation import find_regions
+from spf.segmentation import Region, find_regions
 
 __all__ = ["Doubted", "Start", "find_start"]
 
@@ -45,7 +45,9 @@ _GOOD_PLACE = 0.4  # golden energy under which no farther place is looked at
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
 _PER_SIDE = 4
-_POLISHED = 10  # hypotheses that SMD is run from
+_STRANGE = 0.04  # golden energy that a nat per joint of the network's density weighs
+_FAMILIAR = -8.0  # strangeness of a hand as the network likes it
+_SEEN, _UNSEEN = 0.5, 0.2  # presence of a hand in a region, over which regions under the other are left out
 _APART = 0.025  # m of mean joint distance between two hypotheses worth following
 
 
@@ -168,6 +170,7 @@ def _best_followed(
     rng: np.random.Generator,
 ) -> _Followed:
     """Track every hypothesis for some frames, at a size fitted to them, and return the one that explains them best."""
+    network, _ = available_network()
     ahead = frames[index : index + _VALIDATION_FRAMES]
     rated: list[tuple[float, _Hypothesis]] = []
     for hypothesis in hypotheses:
@@ -181,6 +184,11 @@ def _best_followed(
             fitted = _Hypothesis(sized, relative_to_camera(views[0].pose, views[0].reference), hypothesis.energy)
         infos = _track(fitted, ahead, rng)
         energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
+        seen = [
+            _unseen(network, frame, fitted._replace(pose=s.estimate), s.reference)
+            for frame, (_, s, _) in list(zip(ahead, infos, strict=False))[::4]
+        ]
+        energy += float(np.mean(seen)) if seen else 0.0
         if shape is None:
             energy += float(size_penalty(fitted.shape.scale, SearchSettings()))
         rated.append((energy + 0.5 * (len(ahead) - len(infos)) / len(ahead), fitted))
@@ -211,8 +219,9 @@ def _hypotheses(
     The network's suggestions are polished first, and the whole region is searched where none of them convinces.
     """
     network, _ = available_network()
-    regions = find_regions(frame)[:2]
+    regions = find_regions(frame)
     looks = [] if network is None else [suggested(network, frame, region, sides, shape) for region in regions]
+    regions, looks = _promising(regions, looks)
     result: list[_Hypothesis] = []
     for side in sides:
         hand = shape.hand() if shape else load_hand(side)
@@ -222,15 +231,39 @@ def _hypotheses(
             observation = observe(frame, region.centre, region.radius)
             if observation.is_empty:
                 continue
-            located = locate(hand, observation, region.points, settings, rng, looks[number][side]) if looks else []
-            if not located or located[0][2] > _SUGGESTION_ENOUGH:
-                located += locate(hand, observation, region.points, settings, rng)
-            found += [_Hypothesis(shape or HandShape(side, scale=scale), pose, e) for scale, pose, e in located]
+            for seeds in [*(looks[number][side] if looks else []), None]:
+                if seeds is None and min((h.energy for h in found), default=1.0) < _SUGGESTION_ENOUGH:
+                    break
+                for scale, pose, energy in locate(hand, observation, region.points, settings, rng, seeds):
+                    hypothesis = _Hypothesis(shape or HandShape(side, scale=scale), pose, energy)
+                    found.append(hypothesis._replace(energy=energy + _unseen(network, frame, hypothesis)))
             if min((h.energy for h in found), default=1.0) < _GOOD_PLACE:
                 break
         result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
     least = min((h.energy for h in result), default=0.0)
     return [h for h in result if h.energy < 1.5 * least + 0.05]
+
+
+def _promising(
+    regions: list[Region], looks: list[dict[Side, list[Seeds]]]
+) -> tuple[list[Region], list[dict[Side, list[Seeds]]]]:
+    """Keep two regions, those in which the network sees a hand first; where it does, leave out those in which it sees none."""
+    if not looks:
+        return regions[:2], looks
+    presence = [max(seeds.presence for places in look.values() for seeds in places) for look in looks]
+    order = sorted(range(len(regions)), key=lambda number: presence[number] < _SEEN)[:2]
+    if max(presence) > _SEEN:
+        order = [number for number in order if presence[number] > _UNSEEN]
+    return [regions[number] for number in order], [looks[number] for number in order]
+
+
+def _unseen(network: Network | None, frame: Frame, hypothesis: _Hypothesis, reference: Array | None = None) -> float:
+    """Golden energy that a hypothesis is charged for not being what the network sees where it has its hand."""
+    if network is None:
+        return 0.0
+    axes = np.eye(3) if reference is None else reference
+    strange = strangeness(network, frame, hypothesis.shape.hand(), hypothesis.pose, axes)
+    return _STRANGE * max(strange - _FAMILIAR, 0.0)
 
 
 def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:

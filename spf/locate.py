@@ -16,7 +16,7 @@ from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Hand, Side, load_hand
 from spf.hand.shape import HandShape
-from spf.learned.guesses import Guess, search_hand
+from spf.learned.guesses import Guess, extent_of, guesses, search_hand
 from spf.learned.network import Network
 from spf.observation import Observation
 from spf.optimisers.smd import optimise
@@ -24,12 +24,13 @@ from spf.parallel import map_threads
 from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
 from spf.segmentation import Region
 
-__all__ = ["Seeds", "around", "locate", "reach_of", "suggested"]
+__all__ = ["Seeds", "around", "locate", "reach_of", "strangeness", "suggested"]
 
 Array = NDArray[np.float64]
 _POLISHED = 10  # hypotheses that SMD is run from
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
 _LOOKS = (0.1, 0.3, 0.5, 0.7, 0.9)  # quantiles of a region, along its longest axis, that the network looks at
+_PLACE, _PLACES = 0.08, 3  # m within which guesses are of one place, and the most places of a side
 _NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
 
 
@@ -39,10 +40,12 @@ class Seeds(NamedTuple):
     Attributes:
         poses: (N, D) relative to the camera's axes.
         scales: (N,) relative to the hand that is searched for.
+        presence: 0-1, the most that the network believes of there being a hand; 1 when it was not asked.
     """
 
     poses: Array
     scales: Array
+    presence: float = 1.0
 
 
 def reach_of(hand: Hand) -> float:
@@ -119,11 +122,12 @@ def around(hand: Hand, pose: Array, rng: np.random.Generator) -> Seeds:
 
 def suggested(
     network: Network, frame: Frame, region: Region, sides: Sequence[Side], shape: HandShape | None
-) -> dict[Side, Seeds]:
+) -> dict[Side, list[Seeds]]:
     """Let the network look along a region for hands of each side, at the size of a shape or at any.
 
     Returns:
-        What it suggests, as poses relative to the camera's axes; scales are relative to the mesh, or to the shape's hand.
+        What it suggests for each place where it sees a hand, as poses relative to the camera's axes; scales are relative
+        to the mesh, or to the shape's hand.
     """
     size = None if shape is None else shape.hand().length / load_hand(shape.side).length
     middle = region.points.mean(axis=0)
@@ -133,10 +137,41 @@ def suggested(
     for place in along:
         for guess in search_hand(network, frame.depth, frame.camera, middle + place * axis, size, sides):
             found[guess.side].append(guess)
-    return {side: _seeds(guesses, size) for side, guesses in found.items()}
+    return {side: [_seeds(those, size) for those in _places(every)] for side, every in found.items()}
 
 
-def _seeds(guesses: list[Guess], size: float | None) -> Seeds:
-    poses = np.array([guess.pose for guess in guesses])
-    poses[:, 3:6] = [angles_of(guess.reference) for guess in guesses]
-    return Seeds(poses, np.array([guess.scale if size is None else 1.0 for guess in guesses]))
+def _places(found: list[Guess]) -> list[list[Guess]]:
+    """Divide guesses by where they are: a search that mixes a hand with an elbow keeps what explains more, not the hand."""
+    groups: list[list[Guess]] = []
+    for guess in sorted(found, key=lambda one: -one.log_weight):
+        near = [group for group in groups if np.linalg.norm(guess.pose[:3] - group[0].pose[:3]) < _PLACE]
+        if near:
+            near[0].append(guess)
+        elif len(groups) < _PLACES:
+            groups.append([guess])
+    return groups
+
+
+def strangeness(network: Network, frame: Frame, hand: Hand, pose: Array, reference: Array) -> float:
+    """How little a pose (D,) is what the network sees where its hand is.
+
+    Minus the logarithm of the network's density of the pose's joints, a mean over the joints, lengths in the bundled hand's:
+    the largest over its hypotheses. A render that fits does not tell a fist from an elbow; what is around it does.
+    """
+    joints, size = joints_of(hand, pose, reference), hand.length / load_hand(hand.side).length
+    seen = guesses(network, frame.depth, frame.camera, joints.mean(axis=0), extent_of(size), (hand.side,))
+
+    def log_density(guess: Guess) -> float:
+        spread = 0.5 * guess.joint_sigma  # of the Laplace density exp(-r/b)/(8 π b³)
+        apart = np.linalg.norm(guess.joints - joints, axis=1)
+        per_joint = -apart / spread - 3.0 * np.log(spread / hand.length)
+        return float(per_joint.mean()) + guess.log_weight / len(joints)
+
+    return -max(log_density(guess) for guess in seen)
+
+
+def _seeds(found: list[Guess], size: float | None) -> Seeds:
+    poses = np.array([guess.pose for guess in found])
+    poses[:, 3:6] = [angles_of(guess.reference) for guess in found]
+    scales = np.array([guess.scale if size is None else 1.0 for guess in found])
+    return Seeds(poses, scales, max(guess.presence for guess in found))
