@@ -34,13 +34,13 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 Doubted = Literal["pose", "side"]
 
-DOUBTFUL = 0.42  # mean golden energy over the validation above which a start is not believed
+DOUBTFUL = 0.46  # mean golden energy, charge for strangeness included, over the validation above which a start is not believed
 _SIDES: tuple[Side, Side] = ("right", "left")
 _INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convinces
-_CONVINCING = 0.36  # mean golden energy that ends the search at once …
+_CONVINCING = 0.4  # the same that ends the search at once …
 _CLEAR_MARGIN = 0.03  # … when the other side is this much worse
 _VALIDATION_FRAMES = 16
-_SUGGESTION_ENOUGH = 0.3  # golden energy under which the network's suggestions need no search beside them
+_SUGGESTION_ENOUGH = 0.35  # golden energy under which the network's suggestions need no search beside them
 _GOOD_PLACE = 0.4  # golden energy under which no farther place is looked at
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
