@@ -34,7 +34,9 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 Doubted = Literal["pose", "side"]
 
-DOUBTFUL = 0.46  # mean golden energy, charge for strangeness included, over the validation above which a start is not believed
+DOUBTFUL = (
+    0.46  # mean golden energy, charge for strangeness included, over the validation above which a start is not believed
+)
 _SIDES: tuple[Side, Side] = ("right", "left")
 _INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convinces
 _CONVINCING = 0.4  # the same that ends the search at once …
@@ -127,20 +129,19 @@ def find_start(
     """
     report = progress or (lambda _text, _share: None)
     sides = (shape.side,) if shape else (side,) if side else _SIDES
+    network, _ = available_network()
     best: _Followed | None = None
-    for attempt, index in enumerate(_instants(frames)):
-        if best is not None and attempt >= len(_INSTANTS):
+    for attempt, (index, thorough) in enumerate(_attempts(len(frames), network is not None)):
+        if best is not None and (_clear(best) or (thorough and best.energy < DOUBTFUL)):
             break
-        report("Looking for a hand", min(0.2 * attempt, 0.5))
-        hypotheses = _hypotheses(frames[index], sides, shape, rng)
+        report("Looking for a hand", min(0.1 * attempt, 0.5))
+        hypotheses = _hypotheses(frames[index], sides, shape, network, rng, thorough=thorough)
         if not hypotheses:
             continue
-        report("Following the hypotheses", min(0.2 * attempt + 0.1, 0.6))
+        report("Following the hypotheses", min(0.1 * attempt + 0.05, 0.6))
         followed = _best_followed(frames, index, hypotheses, shape, rng)
         if best is None or followed.energy < best.energy:
             best = followed
-        if best.energy < _CONVINCING and best.margin > _CLEAR_MARGIN:
-            break
     if best is None:
         raise StartError(
             "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
@@ -152,14 +153,24 @@ def find_start(
     return Start(index, pose, reference, best.shape, best.energy, best.margin)
 
 
-def _instants(frames: Sequence[Frame]) -> list[int]:
-    """Frames to look for a hand in: some of the first second, then farther and farther apart until one shows a hand."""
-    instants = [index for index in _INSTANTS if index < len(frames)]
-    far = 45
-    while far < len(frames):
-        instants.append(far)
-        far = far * 3 // 2
-    return instants
+def _clear(start: _Followed) -> bool:
+    """Whether nothing better need be looked for."""
+    return start.energy < _CONVINCING and start.margin > _CLEAR_MARGIN
+
+
+def _attempts(count: int, quickly: bool) -> list[tuple[int, bool]]:
+    """Frames to look for a hand in, and whether all that is there is searched: (index, thorough).
+
+    First, where the network can be asked, what it suggests in some frames of the first second; then everything in the same
+    frames, and in others farther and farther apart until one shows a hand.
+    """
+    near = [index for index in _INSTANTS if index < count]
+    far, index = [], 45
+    while index < count:
+        far.append(index)
+        index = index * 3 // 2
+    quick = [(index, False) for index in near] if quickly else []
+    return [*quick, *((index, True) for index in near), *((index, True) for index in far)]
 
 
 def _best_followed(
@@ -212,13 +223,18 @@ def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
 
 
 def _hypotheses(
-    frame: Frame, sides: Sequence[Side], shape: HandShape | None, rng: np.random.Generator
+    frame: Frame,
+    sides: Sequence[Side],
+    shape: HandShape | None,
+    network: Network | None,
+    rng: np.random.Generator,
+    *,
+    thorough: bool,
 ) -> list[_Hypothesis]:
     """The best different hypotheses of each side, over the places where a hand may be.
 
-    The network's suggestions are polished first, and the whole region is searched where none of them convinces.
+    The network's suggestions are polished; a thorough look searches the whole region besides where none convinces.
     """
-    network, _ = available_network()
     regions = find_regions(frame)
     looks = [] if network is None else [suggested(network, frame, region, sides, shape) for region in regions]
     regions, looks = _promising(regions, looks)
@@ -231,7 +247,7 @@ def _hypotheses(
             observation = observe(frame, region.centre, region.radius)
             if observation.is_empty:
                 continue
-            for seeds in [*(looks[number][side] if looks else []), None]:
+            for seeds in [*(looks[number][side] if looks else []), *([None] if thorough else [])]:
                 if seeds is None and min((h.energy for h in found), default=1.0) < _SUGGESTION_ENOUGH:
                     break
                 for scale, pose, energy in locate(hand, observation, region.points, settings, rng, seeds):

@@ -68,18 +68,15 @@ def locate(
     """
     cost = smart.SpfSettings()
     problem = make_problem(hand, observation, cost, np.eye(3), rng)
-    begun = None if seeds is None else (seeds.poses, seeds.scales)
-    found = search(problem, places, settings, rng) if begun is None else refine(problem, *begun, settings, rng)
-    for _ in range(2):
-        distinct = _spaced(hand, found, _POLISHED)
-        polished = _polish(problem, cost, found.poses[distinct], found.scales[distinct], rng)
-        poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
-        found = refine(problem, poses, scales, settings, rng)
-    return sorted(polished, key=lambda item: item[2])
+    found = search(problem, places, settings, rng) if seeds is None else refine(problem, *seeds[:2], settings, rng)
+    polished = _polish(problem, cost, _spaced(hand, found, _POLISHED), rng)
+    poses, scales = (np.array([item[part] for item in polished]) for part in (1, 0))
+    found = refine(problem, poses, scales, settings, rng)
+    return sorted(_polish(problem, cost, _spaced(hand, found, _POLISHED), rng), key=lambda item: item[2])
 
 
-def _spaced(hand: Hand, found: Hypotheses, most: int) -> list[int]:
-    """Indices of the best hypotheses that differ from each other."""
+def _spaced(hand: Hand, found: Hypotheses, most: int) -> Hypotheses:
+    """The best hypotheses that differ from each other."""
     kept: list[int] = []
     joints: list[Array] = []
     for index, pose in enumerate(found.poses):
@@ -89,23 +86,23 @@ def _spaced(hand: Hand, found: Hypotheses, most: int) -> list[int]:
             joints.append(own)
         if len(kept) == most:
             break
-    return kept
+    return Hypotheses(*(part[kept] for part in found))
 
 
 def _polish(
-    problem: Problem, cost: smart.SpfSettings, poses: Array, scales: Array, rng: np.random.Generator
+    problem: Problem, cost: smart.SpfSettings, rough: Hypotheses, rng: np.random.Generator
 ) -> list[tuple[float, Array, float]]:
     """SMD from each pose at its own scale; (scale, pose, golden energy), never worse than before."""
 
     def run(item: tuple[Array, float, np.random.Generator]) -> tuple[float, Array, float]:
-        rough, scale, seed = item
+        begun, scale, seed = item
         spheres = scaled_spheres(problem.spheres, scale)
         sized = make_problem(problem.hand.scaled(scale), problem.observation, cost, np.eye(3), seed, spheres)
-        pose, _, _ = optimise(sized, cost, seed, rough)
-        before, after = golden(sized, np.stack([rough, pose]))[0]
-        return (scale, pose, float(after)) if after < before else (scale, rough, float(before))
+        pose, _, _ = optimise(sized, cost, seed, begun)
+        before, after = golden(sized, np.stack([begun, pose]))[0]
+        return (scale, pose, float(after)) if after < before else (scale, begun, float(before))
 
-    return map_threads(run, list(zip(poses, scales, rng.spawn(len(poses)), strict=True)))
+    return map_threads(run, list(zip(rough.poses, rough.scales, rng.spawn(len(rough.scales)), strict=True)))
 
 
 def around(hand: Hand, pose: Array, rng: np.random.Generator) -> Seeds:
