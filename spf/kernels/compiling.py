@@ -3,16 +3,31 @@
 Divisions follow IEEE (``error_model="numpy"``): a check for zero would cost a branch each. Functions that allocate no
 array neither count references to those that they are given (``_nrt=False``): numba would do it with two atomic
 operations an array and call, on counters that all threads share.
+
+Compiled kernels are kept for the next process. Parts of them come from other files, whose changes numba does not notice:
+what is kept is kept for exactly these sources.
 """
 
 from __future__ import annotations
 
+import hashlib
+from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
 
 __all__ = ["allocating", "index", "kernel", "part", "strict_kernel"]
+
+
+def _cache_of(sources: Path) -> Path:
+    """Folder of what is compiled from a folder of sources as they now are."""
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(sources.glob("*.py"))))
+    return sources / "__pycache__" / f"kernels-{digest.hexdigest()[:16]}"
+
+
+if not numba.config.CACHE_DIR:  # NUMBA_CACHE_DIR, which goes first
+    numba.config.CACHE_DIR = str(_cache_of(Path(__file__).parent))
 
 _compile: Any = numba.njit  # its declared signature lacks some of the options
 _STRICT: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
