@@ -47,8 +47,6 @@ _GOOD_PLACE = 0.4  # golden energy under which no farther place is looked at
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
 _PER_SIDE = 4
-_STRANGE = 0.04  # golden energy that a nat per joint of the network's density weighs
-_FAMILIAR = -8.0  # strangeness of a hand as the network likes it
 _SEEN, _UNSEEN = 0.5, 0.2  # presence of a hand in a region, over which regions under the other are left out
 _APART = 0.025  # m of mean joint distance between two hypotheses worth following
 
@@ -196,7 +194,7 @@ def _best_followed(
         infos = _track(fitted, ahead, rng)
         energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
         seen = [
-            _unseen(network, frame, fitted._replace(pose=s.estimate), s.reference)
+            strangeness(network, frame, fitted.shape.hand(), s.estimate, s.reference)
             for frame, (_, s, _) in list(zip(ahead, infos, strict=False))[::4]
         ]
         energy += float(np.mean(seen)) if seen else 0.0
@@ -236,7 +234,8 @@ def _hypotheses(
     The network's suggestions are polished; a thorough look searches the whole region besides where none convinces.
     """
     regions = find_regions(frame)
-    looks = [] if network is None else [suggested(network, frame, region, sides, shape) for region in regions]
+    size = None if shape is None else shape.hand().length / load_hand(shape.side).length
+    looks = [] if network is None else [suggested(network, frame, region, sides, size) for region in regions]
     regions, looks = _promising(regions, looks)
     result: list[_Hypothesis] = []
     for side in sides:
@@ -251,8 +250,9 @@ def _hypotheses(
                 if seeds is None and min((h.energy for h in found), default=1.0) < _SUGGESTION_ENOUGH:
                     break
                 for scale, pose, energy in locate(hand, observation, region.points, settings, rng, seeds):
-                    hypothesis = _Hypothesis(shape or HandShape(side, scale=scale), pose, energy)
-                    found.append(hypothesis._replace(energy=energy + _unseen(network, frame, hypothesis)))
+                    sized = shape or HandShape(side, scale=scale)
+                    charge = strangeness(network, frame, sized.hand(), pose, np.eye(3))
+                    found.append(_Hypothesis(sized, pose, energy + charge))
             if min((h.energy for h in found), default=1.0) < _GOOD_PLACE:
                 break
         result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
@@ -271,15 +271,6 @@ def _promising(
     if max(presence) > _SEEN:
         order = [number for number in order if presence[number] > _UNSEEN]
     return [regions[number] for number in order], [looks[number] for number in order]
-
-
-def _unseen(network: Network | None, frame: Frame, hypothesis: _Hypothesis, reference: Array | None = None) -> float:
-    """Golden energy that a hypothesis is charged for not being what the network sees where it has its hand."""
-    if network is None:
-        return 0.0
-    axes = np.eye(3) if reference is None else reference
-    strange = strangeness(network, frame, hypothesis.shape.hand(), hypothesis.pose, axes)
-    return _STRANGE * max(strange - _FAMILIAR, 0.0)
 
 
 def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:

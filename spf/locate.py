@@ -15,7 +15,6 @@ from spf.filters import smart
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Hand, Side, load_hand
-from spf.hand.shape import HandShape
 from spf.learned.guesses import Guess, extent_of, guesses, search_hand
 from spf.learned.network import Network
 from spf.observation import Observation
@@ -31,6 +30,10 @@ _POLISHED = 10  # hypotheses that SMD is run from
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
 _LOOKS = (0.1, 0.3, 0.5, 0.7, 0.9)  # quantiles of a region, along its longest axis, that the network looks at
 _PLACE, _PLACES = 0.08, 3  # m within which guesses are of one place, and the most places of a side
+_STRANGE, _FAMILIAR = (
+    0.04,
+    8.0,
+)  # golden energy of a nat per joint under the density of a hand that the network knows well
 _NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
 
 
@@ -118,15 +121,14 @@ def around(hand: Hand, pose: Array, rng: np.random.Generator) -> Seeds:
 
 
 def suggested(
-    network: Network, frame: Frame, region: Region, sides: Sequence[Side], shape: HandShape | None
+    network: Network, frame: Frame, region: Region, sides: Sequence[Side], size: float | None
 ) -> dict[Side, list[Seeds]]:
-    """Let the network look along a region for hands of each side, at the size of a shape or at any.
+    """Let the network look along a region for hands of each side, of a size relative to the bundled mesh or of any.
 
     Returns:
         What it suggests for each place where it sees a hand, as poses relative to the camera's axes; scales are relative
-        to the mesh, or to the shape's hand.
+        to the bundled mesh, or 1 for a hand of known size.
     """
-    size = None if shape is None else shape.hand().length / load_hand(shape.side).length
     middle = region.points.mean(axis=0)
     axis = np.linalg.svd(region.points - middle, full_matrices=False)[2][0]
     along = np.quantile((region.points - middle) @ axis, _LOOKS)
@@ -149,12 +151,14 @@ def _places(found: list[Guess]) -> list[list[Guess]]:
     return groups
 
 
-def strangeness(network: Network, frame: Frame, hand: Hand, pose: Array, reference: Array) -> float:
-    """How little a pose (D,) is what the network sees where its hand is.
+def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, reference: Array) -> float:
+    """Golden energy that a pose (D,) is charged for not being what the network sees where its hand is; 0 without it.
 
-    Minus the logarithm of the network's density of the pose's joints, a mean over the joints, lengths in the bundled hand's:
-    the largest over its hypotheses. A render that fits does not tell a fist from an elbow; what is around it does.
+    By the network's density of the pose's joints, ``max Σ log p(x)/J`` over its hypotheses, lengths in the hand's. A render
+    that fits does not tell a fist from an elbow; what is around it does.
     """
+    if network is None:
+        return 0.0
     joints, size = joints_of(hand, pose, reference), hand.length / load_hand(hand.side).length
     seen = guesses(network, frame.depth, frame.camera, joints.mean(axis=0), extent_of(size), (hand.side,))
 
@@ -164,7 +168,7 @@ def strangeness(network: Network, frame: Frame, hand: Hand, pose: Array, referen
         per_joint = -apart / spread - 3.0 * np.log(spread / hand.length)
         return float(per_joint.mean()) + guess.log_weight / len(joints)
 
-    return -max(log_density(guess) for guess in seen)
+    return _STRANGE * max(_FAMILIAR - max(log_density(guess) for guess in seen), 0.0)
 
 
 def _seeds(found: list[Guess], size: float | None) -> Seeds:

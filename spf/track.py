@@ -204,7 +204,7 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     limit = min(_believable(state, tracking), 0.8 * state.golden)
     within = _NEAR + _STRIDE * state.missing
     last = relative_to_camera(state.filter.estimate, state.filter.reference)
-    found = recover(frame, tracking.hand, limit, last, within, state.missing, rng)
+    found = recover(frame, tracking.hand, limit, last, within, state.missing, tracking.network, rng)
     if found is None:
         return state
     fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
