@@ -10,6 +10,7 @@ from app.lane import Lane, Origin
 from app.results import Entry, Summary
 from spf.errors import SettingError
 from spf.initialise import Doubted
+from spf.learned.network import available_network
 from spf.sessions import Session
 from spf.trackers import TRACKERS
 
@@ -142,7 +143,8 @@ class State(param.Parameterized):
         for lane in self.lanes:
             lane.clear()
         start = origin.start
-        warning = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
+        doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
+        warning = " ".join(text for text in (doubt, available_network()[1]) if text)
         self.param.update(
             origin=origin, frame=start.frame, error="", warning=warning, revision=self.revision + 1
         )  # fmt: skip

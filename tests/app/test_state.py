@@ -1,8 +1,12 @@
 """The state of a page: settings, presets, what a step leads to, the view."""
 
+import numpy as np
 import pytest
 
+from app.lane import Origin
 from app.state import State
+from spf.hand import HandShape
+from spf.initialise import Start
 from spf.trackers import PRESETS, make_settings
 
 
@@ -53,6 +57,16 @@ def test_a_refused_value_is_put_back_in_the_widgets(state):
 def test_there_is_nowhere_to_step_without_a_start(state):
     assert state.next_frame is None
     assert not state.busy
+
+
+def test_a_start_without_the_network_says_so(state, monkeypatch):
+    shape = HandShape("right")
+    start = Start(0, shape.hand().neutral_pose(), np.eye(3), shape, 0.2, 0.2)
+    state.begin(Origin(start, 0.0, 0))
+    assert state.warning == ""
+    monkeypatch.setattr("app.state.available_network", lambda: (None, "The network is missing."))
+    state.begin(Origin(start, 0.0, 0))
+    assert state.warning == "The network is missing."
 
 
 def test_the_view_adds_up_and_resets(state):
