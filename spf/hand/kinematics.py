@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spf.errors import HandError
 from spf.hand.model import Hand
+from spf.kernels.joints import joints_of_poses
 from spf.kernels.kinematics import Chain, bone_twists, joint_gradient, make_chain, pose_bones
 from spf.kernels.skinning import skin, skin_forces, skin_velocities
 
@@ -16,6 +17,7 @@ __all__ = [
     "PosedHand",
     "angles_of",
     "joints_of",
+    "joints_of_each",
     "pose_hand",
     "relative_to_camera",
     "rotation_about",
@@ -84,6 +86,14 @@ def joints_of(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -
     """Return the 21 joints (21, 3) of a pose, m; cheaper than :func:`pose_hand`."""
     p, chain = _chain(hand, pose, reference)
     return _place_joints(hand, _frames(chain, p))
+
+
+def joints_of_each(hand: Hand, poses: Array) -> Array:
+    """Return the joints (N, 21, 3), m, of poses (N, D) relative to the camera's axes."""
+    joints = np.empty((len(poses), len(hand.joint_bone), 3))
+    p = np.ascontiguousarray(poses, dtype=np.float64)
+    joints_of_poses(hand.skeleton, hand.joint_bone, hand.joint_offset, p, np.eye(3), joints)
+    return joints
 
 
 def _place_joints(hand: Hand, frames: Array) -> Array:

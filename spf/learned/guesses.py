@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from spf.frame import Camera
-from spf.hand.kinematics import joints_of
+from spf.hand.kinematics import joints_of_each
 from spf.hand.model import DOF_NAMES, Hand, Side, load_hand
 from spf.learned import layout
 from spf.learned.crops import make_crops
 from spf.learned.network import Network
 
-__all__ = ["EXTENTS", "Guess", "decode", "extent_of", "guesses", "search_hand"]
+__all__ = ["EXTENTS", "Cubes", "Guess", "decode", "extent_of", "guesses", "search_hand", "side_evidence"]
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ EXTENTS: tuple[float, ...] = (0.16, 0.22, 0.30, 0.41)
 
 _SCALES = (0.5, 2.0)  # of people's hands and what data sets make of them
 _SURENESS = 10.0  # nats by which joints that are sure to a fraction 1/e of the distance outweigh others
+_UNSURE_SIDE = 5.0  # nats, for the side, by a factor e of the joints' spread
 _MIRROR = np.array([-1.0, 1.0, 1.0])
 _SIDES: tuple[Side, Side] = ("right", "left")
 
@@ -50,6 +51,22 @@ class Guess(NamedTuple):
     joint_sigma: Array
     log_weight: float
     presence: float
+
+
+class Cubes(NamedTuple):
+    """M cubes that a network looked at.
+
+    Attributes:
+        centres: (M, 3) m, camera frame.
+        extents: (M,) m, sides.
+        turns: (M, 3, 3) R_camera_crop.
+        perspectives: (M,) side over the distance from the camera to the centre; 0 of an orthographic camera.
+    """
+
+    centres: Array
+    extents: Array
+    turns: Array
+    perspectives: Array
 
 
 def extent_of(scale: float) -> float:
@@ -83,7 +100,7 @@ def guesses(
     sizes = np.atleast_1d(np.asarray(extents, dtype=np.float64))
     centres = np.tile(np.asarray(centre, dtype=np.float64), (len(sizes), 1))
     found = _look(network, depth, camera, centres, sizes, sides)
-    return sorted((guess for group in found for guess in group), key=lambda guess: -guess.log_weight)
+    return sorted((guess for group in found for guess in group), key=_weight)
 
 
 def _look(
@@ -91,62 +108,76 @@ def _look(
 ) -> list[list[Guess]]:
     """Return the guesses of each cube, the best first."""
     crops, turns = make_crops(depth, camera, centres, extents)
+    near = 0.0 if camera.model == "orthographic" else 1.0
+    cubes = Cubes(centres, extents, turns, near * extents / np.linalg.norm(centres, axis=1))
     views = [crops if side == "right" else crops[:, :, ::-1] for side in sides]
     outputs = network.outputs(np.concatenate(views)).reshape(len(sides), len(crops), layout.OUTPUTS)
-    # log odds of a right hand in either view: half their difference is the evidence, and what is usual cancels
-    evidence = 0.5 * outputs[:, :, layout.RIGHT]
-    log_sides = evidence - np.logaddexp.reduce(evidence, axis=0) if len(sides) > 1 else np.zeros_like(evidence)
-    found = []
-    for n, (centre, extent, turn) in enumerate(zip(centres, extents, turns, strict=True)):
-        group: list[Guess] = []
-        for side, numbers, log_side in zip(sides, outputs[:, n], log_sides[:, n], strict=True):
-            group += decode(numbers, side, centre, float(extent), turn, float(log_side))
-        found.append(sorted(group, key=lambda guess: -guess.log_weight))
-    return found
+    log_sides = side_evidence(outputs) if len(sides) > 1 else np.zeros((1, len(crops)))
+    decoded = [decode(*view, cubes) for view in zip(outputs, sides, log_sides, strict=True)]
+    return [sorted((g for group in of_cube for g in group), key=_weight) for of_cube in zip(*decoded, strict=True)]
 
 
-def decode(numbers: Array, side: Side, centre: Array, extent: float, turn: Array, log_side: float) -> list[Guess]:
-    """Return the hypotheses of one crop as hands in the camera frame.
+def side_evidence(outputs: Array) -> Array:
+    """Return the logarithms (S, M) of how probable each of S views (S, M, OUTPUTS) of M crops is the one of a right hand.
+
+    By the log odds that each view's output gives it, where half their difference is the evidence and what is usual
+    cancels; and by how sure the joints are, for a hand is hardest to place in the view in which it is a left one.
+    """
+    raw = outputs[..., : layout.PRESENT].reshape(*outputs.shape[:2], layout.HYPOTHESES, layout.NUMBERS)
+    shares = np.exp(raw[..., layout.LOGIT] - np.logaddexp.reduce(raw[..., layout.LOGIT], axis=-1, keepdims=True))
+    unsure = (shares * raw[..., layout.LOG_SPREADS].mean(axis=-1)).sum(axis=-1)
+    evidence = 0.5 * outputs[..., layout.RIGHT] - _UNSURE_SIDE * unsure
+    return np.asarray(evidence - np.logaddexp.reduce(evidence, axis=0))
+
+
+def _weight(guess: Guess) -> float:
+    """What the best guess has least of."""
+    return -guess.log_weight
+
+
+def decode(numbers: Array, side: Side, log_sides: Array, cubes: Cubes) -> list[list[Guess]]:
+    """Return the hypotheses of each crop as hands in the camera frame.
 
     Args:
-        numbers: (OUTPUTS,) of the crop, for a left hand of the mirrored crop.
+        numbers: (M, OUTPUTS) of the crops, for a left hand of the mirrored crops.
         side: which hand they are taken for.
-        centre: (3,) m, of the cube, camera frame.
-        extent: m, side of the cube.
-        turn: (3, 3) R_camera_crop.
-        log_side: logarithm of the probability that it is this side.
+        log_sides: (M,) logarithm of the probability that it is this side.
+        cubes: that the crops show.
     """
-    raw = numbers[: layout.PRESENT].reshape(layout.HYPOTHESES, layout.NUMBERS)
-    log_shares = raw[:, layout.LOGIT] - np.logaddexp.reduce(raw[:, layout.LOGIT])
-    presence = 1.0 / (1.0 + np.exp(-numbers[layout.PRESENT]))
-    length = load_hand("right").length
-    mirror = _MIRROR if side == "left" else np.ones(3)
-    found = []
-    for row, log_share in zip(raw, log_shares, strict=True):
-        points = (row[layout.POINTS].reshape(-1, 3) * mirror * extent) @ turn.T + centre
-        sigma = 2.0 * np.exp(row[layout.LOG_SPREADS]) * extent
-        scale = float(np.exp(row[layout.LOG_SIZE]) * extent / length)
-        pose = np.zeros(len(DOF_NAMES))
-        pose[list(layout.ARTICULATED)] = row[layout.ANGLES]
-        pose = load_hand(side).constrain(pose)
-        pose[:3], reference = _placed(load_hand(side), scale, pose, points, sigma)
-        found.append(
+    raw = numbers[:, : layout.PRESENT].reshape(-1, layout.HYPOTHESES, layout.NUMBERS)
+    hand, extents = load_hand(side), cubes.extents[:, None]
+    presence = 1.0 / (1.0 + np.exp(-numbers[:, layout.PRESENT]))
+    log_weights = raw[..., layout.LOGIT] - np.logaddexp.reduce(raw[..., layout.LOGIT], axis=1, keepdims=True)
+    log_weights += (log_sides + np.log(np.maximum(presence, 1e-9)))[:, None]
+    points = _points(raw[..., layout.POINTS], side, cubes)
+    sigma = 2.0 * np.exp(raw[..., layout.LOG_SPREADS]) * extents[..., None]
+    scales = np.exp(raw[..., layout.LOG_SIZE]) * extents / load_hand("right").length
+    poses = np.zeros((*scales.shape, len(DOF_NAMES)))
+    poses[..., layout.ARTICULATED] = raw[..., layout.ANGLES]
+    poses = hand.constrain(poses)
+    poses[..., :3], references = _placed(hand, scales, poses, points, sigma)
+    return [
+        [
             Guess(
-                side=side,
-                scale=scale,
-                pose=pose,
-                reference=reference,
-                joints=points[:21],
-                joint_sigma=sigma[:21],
-                log_weight=float(log_share + log_side + np.log(max(presence, 1e-9))),
-                presence=float(presence),
+                side, float(scales[m, h]), poses[m, h], references[m, h], points[m, h, :21], sigma[m, h, :21],
+                float(log_weights[m, h]), float(presence[m]),
             )
-        )
-    return found
+            for h in range(layout.HYPOTHESES)
+        ]
+        for m in range(len(raw))
+    ]  # fmt: skip
 
 
-def _placed(hand: Hand, scale: float, pose: Array, points: Array, sigma: Array) -> tuple[Array, Array]:
-    """Place a hand with bent fingers where the predicted points are (Kabsch 1976).
+def _points(predicted: Array, side: Side, cubes: Cubes) -> Array:
+    """Return predicted points (M, H, 66) in the camera frame (M, H, 22, 3), m: pixel (u, v) of depth z shows (1 + z p)(u, v)."""
+    points = predicted.reshape(*predicted.shape[:2], 22, 3).copy()
+    points[..., :2] *= 1.0 + points[..., 2:] * cubes.perspectives[:, None, None, None]
+    points *= cubes.extents[:, None, None, None] * (_MIRROR if side == "left" else 1.0)
+    return np.asarray(points @ cubes.turns.transpose(0, 2, 1)[:, None] + cubes.centres[:, None, None])
+
+
+def _placed(hand: Hand, scales: Array, poses: Array, points: Array, sigma: Array) -> tuple[Array, Array]:
+    """Place hands with bent fingers where the predicted points are (Kabsch 1976).
 
     The rotation R and translation t that minimise Σ w ‖R a + t − x‖² with w = 1/σ², over the 21 joints and the palm's
     centre a of the hand in its own frame. On recordings this is closer than the network's own rotation and palm, which
@@ -154,23 +185,25 @@ def _placed(hand: Hand, scale: float, pose: Array, points: Array, sigma: Array) 
 
     Args:
         hand: the bundled hand.
-        scale: its predicted size.
-        pose: (26,) with its fingers; the palm's entries are not used.
-        points: (22, 3) m, predicted joints and palm's centre.
-        sigma: (22,) m, of them.
+        scales: (M, H) predicted sizes.
+        poses: (M, H, 26) with their fingers; the palm's entries are zeros.
+        points: (M, H, 22, 3) m, predicted joints and palm's centre.
+        sigma: (M, H, 22) m, of them.
 
     Returns:
-        t (3,), m, and R (3, 3).
+        t (M, H, 3), m, and R (M, H, 3, 3).
     """
-    own = np.zeros((len(points), 3))
-    own[:-1] = scale * joints_of(hand, np.concatenate([np.zeros(6), pose[6:]]))
-    weights = sigma**-2.0 / np.sum(sigma**-2.0)
-    middle, target = weights @ own, weights @ points
-    spread = (points - target).T @ ((own - middle) * weights[:, None])
+    own = np.zeros(points.shape)
+    joints = joints_of_each(hand, poses.reshape(-1, poses.shape[-1])).reshape(*scales.shape, 21, 3)
+    own[..., :-1, :] = scales[..., None, None] * joints
+    weights = sigma[..., None] ** -2.0
+    weights /= weights.sum(axis=-2, keepdims=True)
+    middle, target = (weights * own).sum(axis=-2), (weights * points).sum(axis=-2)
+    spread = (points - target[..., None, :]).swapaxes(-1, -2) @ ((own - middle[..., None, :]) * weights)
     left, _, right = np.linalg.svd(spread)
-    proper = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    rotation = left @ proper @ right
-    return target - rotation @ middle, rotation
+    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
+    rotations = left @ right
+    return target - (rotations @ middle[..., None])[..., 0], rotations
 
 
 def search_hand(

@@ -19,10 +19,11 @@ from spf.hand.kinematics import angles_of, joints_of, pose_hand
 from spf.hand.model import load_hand
 from spf.joint_definitions import corrected_joints, offsets_of
 from spf.learned import layout
-from spf.learned.guesses import Guess, decode, search_hand
+from spf.learned.guesses import Cubes, Guess, decode, search_hand, side_evidence
 from spf.learned.network import Network, load_network
 from spf.segmentation import find_regions
 from spf.sessions import open_session
+from spf.synthetic.trajectory import PALM_TO_SENSOR
 from spf.training.generator import Batch, Generator
 
 __all__ = ["evaluate_recording", "evaluate_synthetic", "main"]
@@ -37,39 +38,62 @@ def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_
 
     Returns:
         median joint errors, mm, of the most probable and of the best hypothesis (both as predicted and posed), of the
-        palm's centre, of the palm's rotation in degrees, of the size in per cent; and how often side and presence are right.
+        palm's centre, of the palm's rotation in degrees, of the size in per cent; the error of the most probable by view,
+        and of hands that are as near to the cube's centre and size as when they are tracked; and how often side (by all
+        that is known, by the output alone) and presence are right.
     """
     batch = Generator(seed, _HELD_OUT_SHAPES).batch(0, samples, left_share=0.5)
     straight, mirrored = network.outputs(batch.crops), network.outputs(batch.crops[:, :, ::-1])
-    there = batch.present > 0.5
-    rightness = straight[:, layout.RIGHT] - mirrored[:, layout.RIGHT]
-    shown = [int(n) for n in np.flatnonzero(there)]
-    rows = [_sample_errors(batch, n, straight[n] if batch.right[n] else mirrored[n]) for n in shown]
-    medians = {name: float(np.median([row[name] for row in rows])) for name in rows[0]}
-    return medians | {
-        "right_side": float(np.mean((rightness[there] > 0.0) == (batch.right[there] > 0.5))),
-        "right_presence": float(np.mean((straight[:, layout.PRESENT] > 0.0) == there)),
+    there, right = batch.present > 0.5, batch.right > 0.5
+    sides = side_evidence(np.stack([straight, mirrored]))
+    logits = straight[:, layout.RIGHT] - mirrored[:, layout.RIGHT]
+    rows = _sample_errors(batch, np.where(right[:, None], straight, mirrored))
+    medians = {name: float(np.median(values[there])) for name, values in rows.items()}
+    facing = (batch.rotations @ PALM_TO_SENSOR.T[:, 2])[:, 2]  # 1: the palm's side is seen
+    kinds = {
+        "palm": facing > 0.5,
+        "edge": np.abs(facing) <= 0.5,
+        "back": facing < -0.5,
+        "tracked": (np.linalg.norm(batch.points[:, :21].mean(axis=1), axis=1) < 0.12)
+        & (np.abs(batch.log_sizes + np.log(layout.EXTENT_PER_LENGTH)) < 0.15),
     }
+    by_kind = {f"{kind}_mm": float(np.median(rows["top_joints_mm"][there & of])) for kind, of in kinds.items()}
+    return (
+        medians
+        | by_kind
+        | {
+            "right_side": float(np.mean((sides[0] > sides[1])[there] == right[there])),
+            "right_side_by_output": float(np.mean((logits > 0.0)[there] == right[there])),
+            "right_presence": float(np.mean((straight[:, layout.PRESENT] > 0.0) == there)),
+        }
+    )
 
 
-def _sample_errors(batch: Batch, n: int, numbers: Array) -> dict[str, float]:
-    """Errors of one sample, whose numbers are of the crop in which its hand is a right one."""
-    length = load_hand("right").length
-    unit = 1e3 * length * float(np.exp(-batch.log_sizes[n]))  # sides of the cube to mm of the bundled hand
-    truth, palm = batch.points[n, :21], batch.points[n, 21]
-    found = sorted(decode(numbers, "right", np.zeros(3), 1.0, np.eye(3), 0.0), key=lambda g: -g.log_weight)
-    predicted = [unit * float(np.linalg.norm(g.joints - truth, axis=1).mean()) for g in found]
-    posed = [unit * float(np.linalg.norm(_posed_joints(g) - truth, axis=1).mean()) for g in found]
-    turned = angles_of(found[0].reference @ batch.rotations[n].T)
-    return {
-        "top_joints_mm": predicted[0],
-        "best_joints_mm": min(predicted),
-        "top_posed_mm": posed[0],
-        "best_posed_mm": min(posed),
-        "palm_mm": unit * float(np.linalg.norm(found[0].pose[:3] - palm)),
-        "rotation_degrees": float(np.degrees(np.linalg.norm(turned))),
-        "size_per_cent": 100.0 * abs(float(np.log(found[0].scale * length) - batch.log_sizes[n])),
-    }
+def _sample_errors(batch: Batch, numbers: Array) -> dict[str, Array]:
+    """Errors (N,) of samples whose numbers are of the crops in which their hands are right ones."""
+    n, length = len(numbers), load_hand("right").length
+    units = 1e3 * length * np.exp(-batch.log_sizes)  # sides of the cube to mm of the bundled hand
+    truths = batch.points * np.where(batch.right[:, None, None] > 0.5, 1.0, [-1.0, 1.0, 1.0])
+    cubes = Cubes(np.zeros((n, 3)), np.ones(n), np.tile(np.eye(3), (n, 1, 1)), batch.perspectives)
+    rows = []
+    for unit, truth, turn, log_size, group in zip(
+        units, truths, batch.rotations, batch.log_sizes, decode(numbers, "right", np.zeros(n), cubes), strict=True
+    ):
+        found = sorted(group, key=lambda guess: -guess.log_weight)
+        predicted = [unit * float(np.linalg.norm(g.joints - truth[:21], axis=1).mean()) for g in found]
+        posed = [unit * float(np.linalg.norm(_posed_joints(g) - truth[:21], axis=1).mean()) for g in found]
+        rows.append(
+            {
+                "top_joints_mm": predicted[0],
+                "best_joints_mm": min(predicted),
+                "top_posed_mm": posed[0],
+                "best_posed_mm": min(posed),
+                "palm_mm": unit * float(np.linalg.norm(found[0].pose[:3] - truth[21])),
+                "rotation_degrees": float(np.degrees(np.linalg.norm(angles_of(found[0].reference @ turn.T)))),
+                "size_per_cent": 100.0 * abs(float(np.log(found[0].scale * length) - log_size)),
+            }
+        )
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def _posed_joints(guess: Guess) -> Array:

@@ -47,10 +47,10 @@ class Plan:
     """
 
     samples: int = 3_000_000
-    batch: int = 128
+    batch: int = 64
     seed: int = 0
     shapes: int = 400
-    rate: float = 2e-3
+    rate: float = 3e-3
     decay: float = 1e-4
     average: float = 0.999
 
@@ -68,6 +68,7 @@ class Trainer:
         self.plan, self.step = plan, 0
         self.network, self.averaged = HandNetwork(), HandNetwork()
         self.averaged.load_state_dict(self.network.state_dict())
+        self.network.to(memory_format=torch.channels_last)  # a third faster
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(), lr=plan.rate, weight_decay=plan.decay, betas=(0.9, 0.98), fused=True
         )
@@ -83,7 +84,7 @@ class Trainer:
         self.network.train()
         for group in self.optimiser.param_groups:
             group["lr"] = self.rate()
-        losses = loss_of(self.network(batch[0]), batch[1:])
+        losses = loss_of(*self.network.look(batch[0].contiguous(memory_format=torch.channels_last)), batch[1:])
         self.optimiser.zero_grad(set_to_none=True)
         losses["loss"].backward()
         torch.nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
