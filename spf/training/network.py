@@ -61,7 +61,7 @@ class HandNetwork(nn.Module):
         self.to_middle = _Merge(b, c)
         self.to_fine = _Merge(a, b)
         self.described = nn.Linear(whole, b)
-        self.attention = nn.Conv2d(a, _POINTS, 1)
+        self.attention = nn.Linear(a, _POINTS)
         self.offsets = nn.Parameter(torch.randn(_POINTS, a + b, 4 + own) * 0.3 / math.sqrt(a + b))
         self.offsets_of_whole = nn.Linear(whole, _POINTS * 4)
         self.rest_of_points = nn.Parameter(torch.randn(layout.HYPOTHESES, 22 * own, _REST) * 0.3 / math.sqrt(22 * own))
@@ -108,9 +108,10 @@ class HandNetwork(nn.Module):
 
     def _points(self, crops: Tensor, fine: Tensor, middle: Tensor, whole: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return places (N, H·22, 2), points and log spreads (N, H·22, 4), and what else cells say of points (N, H·22, own)."""
-        attention = self.attention(fine).flatten(2).softmax(-1)
-        wide = functional.avg_pool2d(attention.view(-1, _POINTS, _CELLS, _CELLS), 2).flatten(2) * 4.0
-        seen = torch.cat([attention @ _cells(fine), wide @ _cells(middle)], dim=-1)
+        cells = _cells(fine)
+        attention = (self.attention.weight @ cells.transpose(1, 2) + self.attention.bias[:, None]).softmax(-1)
+        wide = attention.view(-1, _POINTS, _CELLS // 2, 2, _CELLS // 2, 2).sum((3, 5)).flatten(2)
+        seen = torch.cat([attention @ cells, wide @ _cells(middle)], dim=-1)
         said = (seen.transpose(0, 1) @ self.offsets).transpose(0, 1)
         there = (crops < 1.0).to(crops.dtype)
         surface = functional.avg_pool2d(torch.cat([0.5 * crops * there, there], dim=1), _CELL)

@@ -18,7 +18,6 @@ from dataclasses import asdict, dataclass, replace
 from itertools import count
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -26,10 +25,7 @@ from spf.training.export import export_network
 from spf.training.generator import Batch, Generator
 from spf.training.network import HandNetwork, Losses, loss_of
 
-__all__ = ["REPLAY", "Plan", "Trainer", "batches", "main"]
-
-
-REPLAY = 200  # batches after which a sample is learned from again
+__all__ = ["Plan", "Trainer", "batches", "main"]
 
 
 @dataclass(frozen=True)
@@ -131,28 +127,12 @@ def tensors(batch: Batch) -> tuple[Tensor, ...]:
 
 
 def batches(generator: Generator, first: int, size: int) -> Iterator[tuple[Tensor, ...]]:
-    """Yield batches from number ``first`` on, made ahead in another thread.
-
-    Half of a batch is new; the other half was new REPLAY batches before, so that a sample is learned from twice and costs
-    half. Batch n depends on nothing but n.
-    """
-    half = size // 2
-
-    def fresh(number: int) -> Batch:
-        return generator.batch(number, size if number < REPLAY else half)
-
-    def kept(batch: Batch) -> Batch:
-        return Batch(*(array[:half] for array in batch))
-
+    """Yield batches from number ``first`` on, made ahead in another thread; batch n depends on nothing but n."""
     with ThreadPoolExecutor(1) as maker:
-        waiting = deque(kept(fresh(number)) for number in range(max(first - REPLAY, 0), first))
-        ahead = deque(maker.submit(fresh, first + i) for i in range(2))
+        ahead = deque(maker.submit(generator.batch, first + i, size) for i in range(2))
         for number in count(first):
             new = ahead.popleft().result()
-            ahead.append(maker.submit(fresh, number + 2))
-            waiting.append(kept(new))
-            if number >= REPLAY:
-                new = Batch(*(np.concatenate(pair) for pair in zip(new, waiting.popleft(), strict=True)))
+            ahead.append(maker.submit(generator.batch, number + 2, size))
             yield tensors(new)
 
 

@@ -14,7 +14,7 @@ from spf.learned.network import load_network  # noqa: E402
 from spf.training.export import export_network  # noqa: E402
 from spf.training.generator import Generator  # noqa: E402
 from spf.training.network import loss_of, rotation_of  # noqa: E402
-from spf.training.train import REPLAY, Plan, Trainer, batches, tensors  # noqa: E402
+from spf.training.train import Plan, Trainer, batches, tensors  # noqa: E402
 
 PLAN = Plan(samples=6400, batch=32, shapes=4)
 
@@ -91,12 +91,6 @@ def test_a_resumed_training_takes_the_same_steps(generator, tmp_path):
     resumed = Trainer.load(tmp_path / "checkpoint.pt")
     assert resumed.step == 3
     np.testing.assert_allclose(learn(resumed, 3), whole[3:], rtol=1e-5)
-
-
-def test_half_of_a_late_batch_was_new_before(generator):
-    late = next(batches(generator, REPLAY + 2, 8))
-    torch.testing.assert_close(late[0][:4, 0], torch.from_numpy(generator.batch(REPLAY + 2, 4).crops))
-    torch.testing.assert_close(late[0][4:, 0], torch.from_numpy(generator.batch(2, 8).crops[:4]))
 
 
 def test_the_exported_network_says_the_same(generator, tmp_path):
