@@ -57,7 +57,9 @@ def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_
         "tracked": (np.linalg.norm(batch.points[:, :21].mean(axis=1), axis=1) < 0.12)
         & (np.abs(batch.log_sizes + np.log(layout.EXTENT_PER_LENGTH)) < 0.15),
     }
-    by_kind = {f"{kind}_mm": float(np.median(rows["top_joints_mm"][there & of])) for kind, of in kinds.items()}
+    by_kind = {
+        f"top_joints_{kind}_mm": float(np.median(rows["top_joints_mm"][there & of])) for kind, of in kinds.items()
+    }
     return (
         medians
         | by_kind

@@ -14,7 +14,7 @@ from spf.errors import HandError
 from spf.frame import JOINT_NAMES
 from spf.hand import Hand, load_hand
 from spf.hand.glb import SkinnedMesh, read_glb
-from spf.hand.kinematics import angles_of, joints_of, pose_hand, rotation_about
+from spf.hand.kinematics import angles_of, joints_of, joints_of_each, pose_hand, rotation_about
 from spf.hand.model import mirrored
 from tests.reference.skinning import pose_mesh
 
@@ -107,6 +107,12 @@ def test_mirrored_poses_mirror(seed: int) -> None:
     posed = pose_hand(other, reflected)
     np.testing.assert_allclose(posed.vertices * (-1, 1, 1), expected.vertices, atol=1e-6)
     np.testing.assert_allclose(posed.joints * (-1, 1, 1), expected.joints, atol=1e-6)
+
+
+def test_the_joints_of_many_poses_are_those_of_each(rng):
+    hand = load_hand("left").scaled(1.2)
+    poses = rng.normal(scale=0.4, size=(5, 26))
+    np.testing.assert_allclose(joints_of_each(hand, poses), [joints_of(hand, pose) for pose in poses], atol=1e-12)
 
 
 def test_the_left_mesh_is_nearly_the_right_one_mirrored() -> None:
