@@ -76,7 +76,7 @@ def _sample_errors(batch: Batch, numbers: Array) -> dict[str, Array]:
     n, length = len(numbers), load_hand("right").length
     units = 1e3 * length * np.exp(-batch.log_sizes)  # sides of the cube to mm of the bundled hand
     truths = batch.points * np.where(batch.right[:, None, None] > 0.5, 1.0, [-1.0, 1.0, 1.0])
-    cubes = Cubes(np.zeros((n, 3)), np.ones(n), np.tile(np.eye(3), (n, 1, 1)), batch.perspectives)
+    cubes = Cubes(np.zeros((n, 3)), np.ones(n), np.tile(np.eye(3), (n, 1, 1)), batch.perspectives.astype(np.float64))
     rows = []
     for unit, truth, turn, log_size, group in zip(
         units, truths, batch.rotations, batch.log_sizes, decode(numbers, "right", np.zeros(n), cubes), strict=True
