@@ -15,7 +15,7 @@ from spf.learned import layout
 from spf.learned.crops import make_crops
 from spf.learned.network import Network
 
-__all__ = ["EXTENTS", "Cubes", "Guess", "decode", "extent_of", "guesses", "search_hand"]
+__all__ = ["EXTENTS", "Cubes", "Guess", "decode", "extent_of", "guesses", "search_hand", "side_evidence"]
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ EXTENTS: tuple[float, ...] = (0.16, 0.22, 0.30, 0.41)
 
 _SCALES = (0.5, 2.0)  # of people's hands and what data sets make of them
 _SURENESS = 10.0  # nats by which joints that are sure to a fraction 1/e of the distance outweigh others
+_UNSURE_SIDE = 5.0  # nats, for the side, by a factor e of the joints' spread
 _MIRROR = np.array([-1.0, 1.0, 1.0])
 _SIDES: tuple[Side, Side] = ("right", "left")
 
@@ -59,11 +60,13 @@ class Cubes(NamedTuple):
         centres: (M, 3) m, camera frame.
         extents: (M,) m, sides.
         turns: (M, 3, 3) R_camera_crop.
+        perspectives: (M,) side over the distance from the camera to the centre; 0 of an orthographic camera.
     """
 
     centres: Array
     extents: Array
     turns: Array
+    perspectives: Array
 
 
 def extent_of(scale: float) -> float:
@@ -105,14 +108,26 @@ def _look(
 ) -> list[list[Guess]]:
     """Return the guesses of each cube, the best first."""
     crops, turns = make_crops(depth, camera, centres, extents)
-    cubes = Cubes(centres, extents, turns)
+    near = 0.0 if camera.model == "orthographic" else 1.0
+    cubes = Cubes(centres, extents, turns, near * extents / np.linalg.norm(centres, axis=1))
     views = [crops if side == "right" else crops[:, :, ::-1] for side in sides]
     outputs = network.outputs(np.concatenate(views)).reshape(len(sides), len(crops), layout.OUTPUTS)
-    # log odds of a right hand in either view: half their difference is the evidence, and what is usual cancels
-    evidence = 0.5 * outputs[:, :, layout.RIGHT]
-    log_sides = evidence - np.logaddexp.reduce(evidence, axis=0) if len(sides) > 1 else np.zeros_like(evidence)
+    log_sides = side_evidence(outputs) if len(sides) > 1 else np.zeros((1, len(crops)))
     decoded = [decode(*view, cubes) for view in zip(outputs, sides, log_sides, strict=True)]
     return [sorted((g for group in of_cube for g in group), key=_weight) for of_cube in zip(*decoded, strict=True)]
+
+
+def side_evidence(outputs: Array) -> Array:
+    """Return the logarithms (S, M) of how probable each of S views (S, M, OUTPUTS) of M crops is the one of a right hand.
+
+    By the log odds that each view's output gives it, where half their difference is the evidence and what is usual
+    cancels; and by how sure the joints are, for a hand is hardest to place in the view in which it is a left one.
+    """
+    raw = outputs[..., : layout.PRESENT].reshape(*outputs.shape[:2], layout.HYPOTHESES, layout.NUMBERS)
+    shares = np.exp(raw[..., layout.LOGIT] - np.logaddexp.reduce(raw[..., layout.LOGIT], axis=-1, keepdims=True))
+    unsure = (shares * raw[..., layout.LOG_SPREADS].mean(axis=-1)).sum(axis=-1)
+    evidence = 0.5 * outputs[..., layout.RIGHT] - _UNSURE_SIDE * unsure
+    return np.asarray(evidence - np.logaddexp.reduce(evidence, axis=0))
 
 
 def _weight(guess: Guess) -> float:
@@ -154,9 +169,10 @@ def decode(numbers: Array, side: Side, log_sides: Array, cubes: Cubes) -> list[l
 
 
 def _points(predicted: Array, side: Side, cubes: Cubes) -> Array:
-    """Return predicted points (M, H, 66) in the camera frame (M, H, 22, 3), m."""
-    points = predicted.reshape(*predicted.shape[:2], 22, 3)
-    points = points * cubes.extents[:, None, None, None] * (_MIRROR if side == "left" else 1.0)
+    """Return predicted points (M, H, 66) in the camera frame (M, H, 22, 3), m: pixel (u, v) of depth z shows (1 + z p)(u, v)."""
+    points = predicted.reshape(*predicted.shape[:2], 22, 3).copy()
+    points[..., :2] *= 1.0 + points[..., 2:] * cubes.perspectives[:, None, None, None]
+    points *= cubes.extents[:, None, None, None] * (_MIRROR if side == "left" else 1.0)
     return np.asarray(points @ cubes.turns.transpose(0, 2, 1)[:, None] + cubes.centres[:, None, None])
 
 

@@ -16,7 +16,9 @@ ARTICULATED: tuple[int, ...] = (6, 7, 8, 9, *(d for f in range(4) for d in (10 +
 HYPOTHESES = 3
 
 # Columns of one hypothesis. Lengths are in sides of the cube, from its centre, in the frame of the crop's camera.
-POINTS = slice(0, 66)  # 21 joints and the palm's centre, (22, 3)
+POINTS = slice(
+    0, 66
+)  # 21 joints and the palm's centre, (22, 3): where in the crop (right, down; its side is 1), and depth
 LOG_SPREADS = slice(66, 88)  # logarithm of b of each: density ∝ exp(-r/b)
 ROTATION = slice(88, 94)  # first two columns of the palm's orientation, before orthonormalisation
 ANGLES = slice(94, 110)  # radians

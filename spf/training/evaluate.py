@@ -19,7 +19,7 @@ from spf.hand.kinematics import angles_of, joints_of, pose_hand
 from spf.hand.model import load_hand
 from spf.joint_definitions import corrected_joints, offsets_of
 from spf.learned import layout
-from spf.learned.guesses import Cubes, Guess, decode, search_hand
+from spf.learned.guesses import Cubes, Guess, decode, search_hand, side_evidence
 from spf.learned.network import Network, load_network
 from spf.segmentation import find_regions
 from spf.sessions import open_session
@@ -39,12 +39,13 @@ def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_
     Returns:
         median joint errors, mm, of the most probable and of the best hypothesis (both as predicted and posed), of the
         palm's centre, of the palm's rotation in degrees, of the size in per cent; the error of the most probable by view,
-        and of hands that are as near to the cube's centre and size as when they are tracked; and how often side
-        and presence are right.
+        and of hands that are as near to the cube's centre and size as when they are tracked; and how often side (by all
+        that is known, by the output alone) and presence are right.
     """
     batch = Generator(seed, _HELD_OUT_SHAPES).batch(0, samples, left_share=0.5)
     straight, mirrored = network.outputs(batch.crops), network.outputs(batch.crops[:, :, ::-1])
     there, right = batch.present > 0.5, batch.right > 0.5
+    sides = side_evidence(np.stack([straight, mirrored]))
     logits = straight[:, layout.RIGHT] - mirrored[:, layout.RIGHT]
     rows = _sample_errors(batch, np.where(right[:, None], straight, mirrored))
     medians = {name: float(np.median(values[there])) for name, values in rows.items()}
@@ -63,7 +64,8 @@ def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_
         medians
         | by_kind
         | {
-            "right_side": float(np.mean((logits > 0.0)[there] == right[there])),
+            "right_side": float(np.mean((sides[0] > sides[1])[there] == right[there])),
+            "right_side_by_output": float(np.mean((logits > 0.0)[there] == right[there])),
             "right_presence": float(np.mean((straight[:, layout.PRESENT] > 0.0) == there)),
         }
     )
@@ -73,10 +75,11 @@ def _sample_errors(batch: Batch, numbers: Array) -> dict[str, Array]:
     """Errors (N,) of samples whose numbers are of the crops in which their hands are right ones."""
     n, length = len(numbers), load_hand("right").length
     units = 1e3 * length * np.exp(-batch.log_sizes)  # sides of the cube to mm of the bundled hand
-    cubes = Cubes(np.zeros((n, 3)), np.ones(n), np.tile(np.eye(3), (n, 1, 1)))
+    truths = batch.points * np.where(batch.right[:, None, None] > 0.5, 1.0, [-1.0, 1.0, 1.0])
+    cubes = Cubes(np.zeros((n, 3)), np.ones(n), np.tile(np.eye(3), (n, 1, 1)), batch.perspectives.astype(np.float64))
     rows = []
     for unit, truth, turn, log_size, group in zip(
-        units, batch.points, batch.rotations, batch.log_sizes, decode(numbers, "right", np.zeros(n), cubes), strict=True
+        units, truths, batch.rotations, batch.log_sizes, decode(numbers, "right", np.zeros(n), cubes), strict=True
     ):
         found = sorted(group, key=lambda guess: -guess.log_weight)
         predicted = [unit * float(np.linalg.norm(g.joints - truth[:21], axis=1).mean()) for g in found]

@@ -30,15 +30,17 @@ class Batch(NamedTuple):
         points: (N, 22, 3) float32: 21 joints and the palm's centre.
         rotations: (N, 3, 3) float32 orientation of the palm.
         angles: (N, 16) float32 radians, of ARTICULATED.
+        perspectives: (N,) float32, the cube's side over the distance from the camera to its centre.
         log_sizes: (N,) float32, logarithm of the bundled hand's length times the hand's size over the cube's side.
         present: (N,) float32, 1 where there is a hand.
-        right: (N,) float32, 1 where it is a right one; of mirrored crops only ``present`` and this are true.
+        right: (N,) float32, 1 where it is a right one; of mirrored crops ``rotations`` are not true.
     """
 
     crops: Image
     points: Image
     rotations: Image
     angles: Image
+    perspectives: Image
     log_sizes: Image
     present: Image
     right: Image
@@ -61,7 +63,7 @@ class Generator:
         rng = np.random.default_rng([seed, 2])
         self._pools = Pools(rng.standard_normal(_POOL, dtype=np.float32), rng.random(_POOL, dtype=np.float32))
 
-    def batch(self, number: int, n: int, left_share: float = 0.25) -> Batch:
+    def batch(self, number: int, n: int, left_share: float = 0.18) -> Batch:
         """Make batch ``number`` of n samples, of which a share are mirrored."""
         rng = np.random.default_rng([self.seed, 3, number])
         scenes, left = draw_scenes(rng, n, self.table, left_share)
@@ -71,11 +73,13 @@ class Generator:
         crops[left] = crops[left, :, ::-1]
         centres = np.stack([np.zeros(n), np.zeros(n), scenes.away], axis=1)
         points = np.concatenate([joints, scenes.poses[:, None, :3]], axis=1) - centres[:, None]
+        points[left, :, 0] *= -1.0
         return Batch(
             crops,
             (points / scenes.extents[:, None, None]).astype(np.float32),
             scenes.orientations.astype(np.float32),
             scenes.poses[:, ARTICULATED].astype(np.float32),
+            (scenes.extents / scenes.away).astype(np.float32),
             np.log(load_hand("right").length * self.table.sizes[scenes.shape] / scenes.extents).astype(np.float32),
             scenes.drawn.astype(np.float32),
             (~left).astype(np.float32),

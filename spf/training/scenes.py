@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 _HAND_MIDDLE = np.array([-0.005, -0.005, -0.035])  # m, middle of the joints of the bundled hand, model frame
 _RINGS, _BLOBS = 10, 3
-_EMPTY_SHARE = 0.08
+_EMPTY_SHARE = 0.05
 _POOL = 1 << 22
 _ABSENT = -1.0  # coordinates of what is not drawn: behind the camera
 
@@ -69,7 +69,7 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
     """Draw n scenes, of which a share are to be mirrored."""
     shape = rng.integers(len(shapes.sizes), size=n)
     size = shapes.sizes[shape]
-    extents = EXTENT_PER_LENGTH * shapes.lengths[shape] * np.exp(rng.uniform(-0.32, 0.34, n))
+    extents = EXTENT_PER_LENGTH * shapes.lengths[shape] * np.exp(_misfits(rng, n))
     away = extents / np.exp(rng.uniform(np.log(0.2), np.log(0.9), n))
     orientations = _orientations(rng, n)
     middles = _jitter(rng, n) * extents[:, None]
@@ -78,7 +78,7 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
     poses = np.zeros((n, 26))
     poses[:, 6:] = draw_articulations(rng, n)
     poses[:, :3] = middles - np.einsum("nij,nj->ni", orientations, size[:, None] * _HAND_MIDDLE)
-    focal = np.exp(rng.uniform(np.log(0.6), np.log(1.9), n)) * CROP_SIZE * away / extents
+    focal = np.exp(rng.uniform(np.log(0.75), np.log(2.1), n)) * CROP_SIZE * away / extents
     sizes = np.minimum(np.ceil(focal * extents / away * 1.03) + 4, LARGEST_PICTURE).astype(np.int64)
     kernel = SampleScenes(
         shape=shape,
@@ -86,7 +86,7 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
         poses=poses,
         orientations=orientations,
         others=_others(rng, shapes, shape, poses, orientations, away, extents, empty),
-        planes=_planes(rng, n, extents, np.where(empty, 0.35, 0.13)),
+        planes=_planes(rng, n, extents, np.where(empty, 0.35, 0.1)),
         away=away,
         extents=extents,
         focal=focal,
@@ -108,13 +108,18 @@ def _orientations(rng: np.random.Generator, n: int) -> Array:
     return np.asarray(turned)
 
 
+def _misfits(rng: np.random.Generator, n: int) -> Array:
+    """Logarithms (n,) of cubes' sides over the usual one: nearly the usual when a hand is tracked, any in a first look."""
+    return np.where(rng.random(n) < 0.6, rng.normal(0.0, 0.07, n), rng.uniform(-0.34, 0.36, n))
+
+
 def _jitter(rng: np.random.Generator, n: int) -> Array:
     """Offsets (n, 3) of the hand from the cube's centre, in sides of the cube: mostly small, sometimes large."""
     near = rng.normal(0.0, 0.04, (n, 3))
     direction = rng.normal(size=(n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     far = direction * (0.3 * np.cbrt(rng.random((n, 1))))
-    return np.where(rng.random((n, 1)) < 0.68, near, far)
+    return np.where(rng.random((n, 1)) < 0.75, near, far)
 
 
 def _others(
@@ -123,9 +128,9 @@ def _others(
 ) -> Array:  # fmt: skip
     """Vertices (n, W, 3) of forearm and blobs."""
     arm = _forearms(rng, shapes, shape, poses, orientations)
-    arm[rng.random(len(shape)) < np.where(empty, 0.4, 0.12)] = _ABSENT
+    arm[rng.random(len(shape)) < np.where(empty, 0.4, 0.06)] = _ABSENT
     centres = np.stack([np.zeros_like(away), np.zeros_like(away), away], axis=1)
-    blobs = [_blobs(rng, centres, extents, np.where(empty, 0.4, 0.13)) for _ in range(_BLOBS)]
+    blobs = [_blobs(rng, centres, extents, np.where(empty, 0.4, 0.08)) for _ in range(_BLOBS)]
     return np.concatenate([arm, *blobs], axis=1)
 
 
@@ -139,7 +144,7 @@ def _forearms(
         1, np.radians(rng.normal(0.0, 13.0, n))
     )
     along = np.linspace(0.0, 1.0, _RINGS)
-    length = np.where(rng.random(n) < 0.75, rng.uniform(0.9, 1.6, n), rng.uniform(0.05, 0.9, n)) * size
+    length = np.where(rng.random(n) < 0.85, rng.uniform(0.9, 1.6, n), rng.uniform(0.05, 0.9, n)) * size
     growth = rng.uniform(0.05, 0.75, n)[:, None] * np.minimum(along * length[:, None] / size[:, None], 1.0)
     sleeve = (along > rng.uniform(0.05, 1.0, (n, 1))) * np.where(rng.random(n) < 0.3, rng.uniform(0.0, 0.6, n), 0.0)[
         :, None
@@ -190,15 +195,15 @@ def _faults(rng: np.random.Generator, n: int) -> Array:
     """Sensors' faults (n, len(FAULTS)), from nearly none to more than real ones have; one in fourteen has none."""
     clean = rng.random(n) < 0.07
     drawn = {
-        "ragged": rng.uniform(0.0, 1.0, n) * (rng.random(n) < 0.7),
-        "flying": rng.uniform(0.0, 0.5, n) * (rng.random(n) < 0.5),
-        "eroded": rng.uniform(0.0, 0.8, n) * (rng.random(n) < 0.4),
-        "white": 0.004 * rng.random(n) ** 2,
-        "grainy": 0.006 * rng.random(n) ** 1.5 * (rng.random(n) < 0.8),
+        "ragged": 0.8 * rng.random(n) ** 1.5 * (rng.random(n) < 0.6),
+        "flying": 0.5 * rng.random(n) ** 1.5 * (rng.random(n) < 0.5),
+        "eroded": 0.8 * rng.random(n) ** 1.5 * (rng.random(n) < 0.4),
+        "white": 0.003 * rng.random(n) ** 2,
+        "grainy": 0.005 * rng.random(n) ** 2 * (rng.random(n) < 0.8),
         "grain": rng.uniform(2.0, 8.0, n),
-        "holes": np.where(rng.random(n) < 0.6, rng.uniform(1.9, 4.0, n), 9.0),
+        "holes": np.where(rng.random(n) < 0.3, rng.uniform(2.0, 4.0, n), 9.0),
         "hole_size": rng.uniform(2.0, 9.0, n),
-        "steepest": np.where(rng.random(n) < 0.6, rng.uniform(2.5, 7.0, n), 1e6),
+        "steepest": np.where(rng.random(n) < 0.4, rng.uniform(2.5, 7.0, n), 1e6),
         "smooths": (rng.random(n) < 0.4).astype(float),
         "step": rng.choice([0.0001, 0.001, 0.002, 0.004], size=n),
     }

@@ -10,7 +10,7 @@ from spf.hand.kinematics import joints_of
 from spf.hand.model import load_hand
 from spf.learned import layout
 from spf.learned.crops import turn_towards
-from spf.learned.guesses import Guess, extent_of, guesses, search_hand
+from spf.learned.guesses import Cubes, Guess, decode, extent_of, guesses, search_hand, side_evidence
 from spf.learned.network import Network, load_network
 from spf.synthetic import SyntheticSettings, synthesise
 from tests.scenes import FACING
@@ -20,7 +20,7 @@ KNOWN_SIZE, UNKNOWN_SIZE = 0.018, 0.014
 
 CAMERA = Camera(320, 240, 230.0, 230.0, 160.0, 120.0)
 NOTHING = np.zeros((240, 320), np.float32)
-CENTRE = np.array([0.1, -0.05, 0.5])
+CENTRE, EXTENT = np.array([0.1, -0.05, 0.5]), 0.25
 
 
 class Says:
@@ -47,6 +47,7 @@ def a_network(rightness: float = 3.0) -> Network:
     pose = np.zeros(26)
     pose[list(layout.ARTICULATED)] = 0.3
     joints = joints_of(load_hand("right").scaled(0.6 / load_hand("right").length), pose, FACING)
+    joints[:, :2] /= 1.0 + joints[:, 2:] * EXTENT / np.linalg.norm(CENTRE)  # where the crop shows them
     raw[:, layout.POINTS] = np.concatenate([joints.ravel(), np.zeros(3)])
     raw[1, layout.LOGIT] = 2.0
     numbers[layout.PRESENT] = 1.0
@@ -54,18 +55,18 @@ def a_network(rightness: float = 3.0) -> Network:
 
 
 def test_a_guess_poses_the_hand_that_the_network_saw():
-    best = guesses(a_network(), NOTHING, CAMERA, CENTRE, 0.25, ["right"])[0]
+    best = guesses(a_network(), NOTHING, CAMERA, CENTRE, EXTENT, ["right"])[0]
     hand = load_hand("right").scaled(best.scale)
-    assert hand.length == pytest.approx(0.6 * 0.25)
+    assert hand.length == pytest.approx(0.6 * EXTENT)
     np.testing.assert_allclose(best.pose[:3], CENTRE, atol=1e-12)
     np.testing.assert_allclose(best.reference, turn_towards(CENTRE) @ FACING, atol=1e-12)
     np.testing.assert_allclose(joints_of(hand, best.pose, best.reference), best.joints, atol=1e-9)
-    np.testing.assert_allclose(best.joint_sigma, 2.0 * 0.01 * 0.25)
+    np.testing.assert_allclose(best.joint_sigma, 2.0 * 0.01 * EXTENT)
     assert best.presence == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
 
 
 def test_a_left_hand_is_the_mirror_image_in_the_ray_s_plane():
-    found = guesses(a_network(), NOTHING, CAMERA, CENTRE, 0.25)
+    found = guesses(a_network(), NOTHING, CAMERA, CENTRE, EXTENT)
     right = next(guess for guess in found if guess.side == "right")
     left = next(guess for guess in found if guess.side == "left")
     turn, mirror = turn_towards(CENTRE), np.diag([-1.0, 1.0, 1.0])
@@ -86,6 +87,22 @@ def test_the_best_come_first_and_the_side_decides(rightness, side):
     assert found[0].side == side
     cube = guesses(a_network(rightness), NOTHING, CAMERA, CENTRE, 0.25)
     assert sum(np.exp(guess.log_weight) for guess in cube) == pytest.approx(cube[0].presence)
+
+
+def test_joints_that_are_sure_in_one_view_only_decide_the_side():
+    numbers = a_network().session.numbers
+    views = np.tile(numbers, (2, 1, 1))
+    views[1, :, : layout.PRESENT].reshape(layout.HYPOTHESES, layout.NUMBERS)[:, layout.LOG_SPREADS] += 0.5
+    logs = side_evidence(views)[:, 0]
+    assert np.exp(logs).sum() == pytest.approx(1.0)
+    assert np.exp(logs[0]) > 0.8
+
+
+def test_an_orthographic_crop_shows_the_points_where_they_are():
+    numbers = a_network().session.numbers[None]
+    cubes = Cubes(np.zeros((1, 3)), np.ones(1), np.eye(3)[None], np.zeros(1))
+    ((first, *_),) = decode(numbers, "right", np.zeros(1), cubes)
+    np.testing.assert_allclose(first.joints.ravel(), numbers[0, layout.POINTS][:63], atol=1e-12)
 
 
 def test_the_cube_grows_with_the_hand():

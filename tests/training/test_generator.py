@@ -86,6 +86,7 @@ def test_a_mirrored_sample_shows_the_mirrored_crop(generator):
     np.testing.assert_array_equal(flipped.crops, plain.crops[:, :, ::-1])
     assert (plain.right == 1.0).all()
     assert (flipped.right == 0.0).all()
+    np.testing.assert_array_equal(flipped.points, plain.points * np.array([-1.0, 1.0, 1.0], np.float32))
 
 
 def test_size_is_relative_to_the_bundled_hand():
