@@ -26,7 +26,7 @@ from spf.learned.network import Network, available_network
 from spf.locate import Seeds, locate, reach_of, strangeness, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings, size_penalty
-from spf.segmentation import Region, find_regions
+from spf.segmentation import Region, find_plane, find_regions
 
 __all__ = ["Doubted", "Start", "find_start"]
 
@@ -34,9 +34,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 Doubted = Literal["pose", "side"]
 
-DOUBTFUL = (
-    0.46  # mean golden energy, charge for strangeness included, over the validation above which a start is not believed
-)
+DOUBTFUL = 0.46  # mean golden energy over the validation, strangeness included, above which a start is not believed
 _SIDES: tuple[Side, Side] = ("right", "left")
 _INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convinces
 _CONVINCING = 0.4  # the same that ends the search at once …
@@ -233,7 +231,8 @@ def _hypotheses(
 
     The network's suggestions are polished; a thorough look searches the whole region besides where none convinces.
     """
-    regions = find_regions(frame)
+    plane = find_plane(frame, rng)
+    regions = find_regions(frame, plane)
     size = None if shape is None else shape.hand().length / load_hand(shape.side).length
     looks = [] if network is None else [suggested(network, frame, region, sides, size) for region in regions]
     regions, looks = _promising(regions, looks)
@@ -243,7 +242,7 @@ def _hypotheses(
         settings = SearchSettings(scale_spread=0.0) if shape else SearchSettings()
         found: list[_Hypothesis] = []
         for number, region in enumerate(regions):
-            observation = observe(frame, region.centre, region.radius)
+            observation = observe(frame, region.centre, region.radius, plane=plane)
             if observation.is_empty:
                 continue
             for seeds in [*(looks[number][side] if looks else []), *([None] if thorough else [])]:

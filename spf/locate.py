@@ -30,10 +30,8 @@ _POLISHED = 10  # hypotheses that SMD is run from
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
 _LOOKS = (0.1, 0.3, 0.5, 0.7, 0.9)  # quantiles of a region, along its longest axis, that the network looks at
 _PLACE, _PLACES = 0.08, 3  # m within which guesses are of one place, and the most places of a side
-_STRANGE, _FAMILIAR = (
-    0.04,
-    8.0,
-)  # golden energy of a nat per joint under the density of a hand that the network knows well
+_STRANGE = 0.1  # golden energy of a nat per joint under the density …
+_FAMILIAR = 8.0  # … of a hand that the network knows well
 _NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
 
 

@@ -15,7 +15,7 @@ from spf.learned.network import Network
 from spf.locate import Seeds, around, locate, reach_of, strangeness, suggested
 from spf.observation import observe
 from spf.search import SearchSettings
-from spf.segmentation import Region, find_regions
+from spf.segmentation import Region, find_plane, find_regions
 
 __all__ = ["recover"]
 
@@ -71,8 +71,9 @@ def recover(
         pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
         if pose is not None:
             return pose
-    for region in find_regions(frame)[:2]:
-        observation = observe(frame, region.centre, region.radius)
+    plane = find_plane(frame, rng)
+    for region in find_regions(frame, plane)[:2]:
+        observation = observe(frame, region.centre, region.radius, plane=plane)
         if observation.is_empty:
             continue
         for seeds in _places(network, frame, region, hand, last):
