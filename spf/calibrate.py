@@ -34,8 +34,7 @@ _NAMES = len(_PRIOR_SPREAD)
 _POOL = 250
 _BACKGROUND = 0.2
 _DELTA = 1e-3
-_SIZES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])  # tried about the last size, in steps of its logarithm …
-_SIZE_STEPS = (0.05, 0.025)  # … of these lengths
+_SIZES = (0.88, 0.92, 0.96, 1.0, 1.04)
 _AS_GOOD = 0.03  # share by which a golden energy may be higher and weigh 1/e
 
 
@@ -56,28 +55,26 @@ class View(NamedTuple):
 def size_by_render(
     views: list[View], shape: HandShape, rng: np.random.Generator
 ) -> tuple[HandShape, list[View], float]:
-    """Average the scales whose renders explain the views, each weighed by how well it does; coarsely, then finely.
+    """Average the scales whose renders explain the views, each weighed by how well it does.
 
-    Gauss-Newton errs by some per cent, because an uncovered pixel pulls otherwise than a model point beside the hand; the
-    render has no such preference.
+    Gauss-Newton swells the hand a little, because an uncovered pixel pulls harder than a model point beside the hand.
 
     Returns:
         (shape, views with their poses in that shape, mean golden energy).
     """
     settings, descent = CostSettings(), SmdSettings()
-
-    def posed(sized: HandShape) -> tuple[list[View], float]:
-        stream, hand = np.random.default_rng(seed), sized.hand()  # the same randomness for all sizes
-        again = _repose(_repose(views, hand, settings, descent, stream), hand, settings, descent, stream)
-        return again, _mean_golden(again, hand, settings, stream)
-
-    for step in _SIZE_STEPS:
-        seed = int(rng.integers(2**32))
-        energies = np.array([posed(shape._replace(scale=shape.scale * float(f)))[1] for f in np.exp(step * _SIZES)])
-        weights = np.exp(-(energies / energies.min() - 1.0) / _AS_GOOD)
-        shape = shape._replace(scale=shape.scale * float(np.exp(step * (_SIZES @ weights) / weights.sum())))
-        views, energy = posed(shape)
-    return shape, views, energy
+    energies, seed = [], int(rng.integers(2**32))
+    for factor in _SIZES:
+        stream = np.random.default_rng(seed)  # the same randomness for all sizes
+        hand = shape._replace(scale=shape.scale * factor).hand()
+        posed = _repose(_repose(views, hand, settings, descent, stream), hand, settings, descent, stream)
+        energies.append(_mean_golden(posed, hand, settings, stream))
+    apart = np.array(energies) / min(energies) - 1.0
+    weights = np.exp(-apart / _AS_GOOD)
+    sized = shape._replace(scale=shape.scale * float(np.exp(np.log(_SIZES) @ weights / weights.sum())))
+    hand = sized.hand()
+    posed = _repose(_repose(views, hand, settings, descent, rng), hand, settings, descent, rng)
+    return sized, posed, _mean_golden(posed, hand, settings, rng)
 
 
 def _mean_golden(views: list[View], hand: Hand, settings: CostSettings, rng: np.random.Generator) -> float:

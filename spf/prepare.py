@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from spf.calibrate import View, fit_shape, size_by_render
+from spf.calibrate import View, fit_shape
 from spf.cost.problem import golden, make_problem
 from spf.cost.settings import CostSettings
 from spf.errors import HandError, StartError
@@ -181,9 +181,8 @@ def _calibrated(side: Side, frames: SessionFrames, rng: np.random.Generator) -> 
             if frame.truth is not None:
                 pose, reference = fit_pose(hand, frame.truth.joints)
                 views.append(View(observe(frame, pose[:3], reach_of(hand)), pose, reference))
-        seen = [view for view in views if not view.observation.is_empty]
-        shape, seen, _ = fit_shape(seen, shape, rng, refine=refined)
-    return size_by_render(seen, shape, rng)[0]
+        shape = fit_shape([view for view in views if not view.observation.is_empty], shape, rng, refine=refined)[0]
+    return shape
 
 
 def _judged(frame: Frame, shape: HandShape, pose: Array, reference: Array, rng: np.random.Generator) -> Start:

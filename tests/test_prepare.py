@@ -102,7 +102,7 @@ def test_side_and_size_come_from_joints_that_are_all_the_truth_has(side):
     session = dataclasses.replace(made, side=None, hand_shape=None)
     start = prepare(session, init="truth")
     assert start.shape.side == side
-    assert start.shape.hand().length == pytest.approx(made.hand.length, rel=0.04)
+    assert start.shape.hand().length == pytest.approx(made.hand.length, rel=0.06)
     joints = joints_of(start.shape.hand(), start.pose, start.reference)
     assert np.linalg.norm(joints - session[0].truth.joints, axis=1).mean() < 0.008
 
