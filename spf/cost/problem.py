@@ -17,9 +17,18 @@ from spf.kernels.kinematics import make_chain
 from spf.kernels.sight import make_sight, match_pixels, see
 from spf.kernels.smd import Scratch, evaluate_poses, make_scratch
 from spf.observation import Observation
-from spf.parallel import per_thread
+from spf.parallel import map_threads, per_thread, threads
 
-__all__ = ["Correspondences", "Problem", "correspondences", "costs", "golden", "make_problem", "scratch_of"]
+__all__ = [
+    "Correspondences",
+    "Problem",
+    "correspondences",
+    "costs",
+    "golden",
+    "golden_of_many",
+    "make_problem",
+    "scratch_of",
+]
 
 Array = NDArray[np.float64]
 GOLDEN_TRUNCATION = 0.04  # T, m
@@ -114,6 +123,13 @@ def golden(problem: Problem, poses: Array, scales: Array | None = None) -> tuple
         np.ascontiguousarray(scales), problem.reference, GOLDEN_TRUNCATION, canvas, energies, overlaps,
     )  # fmt: skip
     return energies, overlaps
+
+
+def golden_of_many(problem: Problem, poses: Array) -> tuple[Array, Array]:
+    """The same as :func:`golden`, by all threads together; not to be called within one of them."""
+    chunks = np.array_split(poses, min(threads(), len(poses)))
+    parts = map_threads(lambda chunk: golden(problem, chunk), chunks)
+    return np.concatenate([energies for energies, _ in parts]), np.concatenate([overlaps for _, overlaps in parts])
 
 
 def scratch_of(problem: Problem) -> Scratch:

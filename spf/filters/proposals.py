@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from spf.cost.problem import Problem, golden
+from spf.cost.problem import Problem, golden, golden_of_many
 from spf.hand.kinematics import angles_of, rotation_about
 from spf.hand.model import DIP_PER_PIP
 from spf.settings import Settings, setting
@@ -165,7 +165,7 @@ def recombine(problem: Problem, poses: Array, energies: Array) -> tuple[Array | 
         columns = _digit_entries(len(best), digit)
         others[:, columns] = poses[order[1:]][:, columns]
         options = problem.hand.constrain(np.concatenate([others, options]))
-        tried, _ = golden(problem, options)
+        tried, _ = golden_of_many(problem, options)
         renders += len(options)
         if tried.min() < _BETTER * energy:
             energy = float(tried.min())

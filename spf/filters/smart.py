@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.cost.problem import Problem, golden, make_problem
+from spf.cost.problem import Problem, golden_of_many, make_problem
 from spf.filters.dynamics import DynamicsSettings, drift, noise_scale, predict
 from spf.filters.estimate import Samples, conclude
 from spf.filters.kde import CorrectionSettings, correct
@@ -179,7 +179,7 @@ def _recombined(
     """Recombine the digits of the optimised samples (N, D) and optimise the result; None when nothing gets better."""
     if settings.recombination == 0.0:
         return None
-    energies, _ = golden(problem, optimised)
+    energies, _ = golden_of_many(problem, optimised)
     mixed, renders = recombine(problem, optimised, energies)
     if mixed is None:
         return None
