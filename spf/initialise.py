@@ -1,8 +1,8 @@
 """The automatic first pose: hand found, its side and size estimated, hypotheses believed only after several frames.
 
-No human and no truth is involved. Hypotheses of both sides are searched in the first frame in which something of a hand's
-size is seen, by rendering (:mod:`spf.search`); the best of each side are then tracked for some frames, and the one that goes
-on explaining the depth wins. A wrong side or size may explain one frame, but seldom a hand that moves.
+No human and no truth is involved. Hypotheses of both sides are looked for in some frames (:mod:`spf.hypotheses`); the best of
+each side are then tracked for some more, and the one that goes on explaining the depth wins. A wrong side or size may explain
+one frame, but seldom a hand that moves.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from spf.errors import StartError
 from spf.filters import smart
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
-from spf.hand.kinematics import joints_of, relative_to_camera
-from spf.hand.model import Side, load_hand
+from spf.hand.kinematics import relative_to_camera
+from spf.hand.model import Side
 from spf.hand.shape import HandShape
-from spf.learned.network import Network, available_network
-from spf.locate import Seeds, locate, reach_of, strangeness, suggested
+from spf.hypotheses import Hypothesis, hypotheses_of
+from spf.learned.network import available_network
+from spf.locate import reach_of, strangeness
 from spf.observation import Observation, observe
 from spf.search import SearchSettings, size_penalty
-from spf.segmentation import Region, find_plane, find_regions
 
 __all__ = ["Doubted", "Start", "find_start"]
 
@@ -37,16 +37,11 @@ Doubted = Literal["pose", "side"]
 DOUBTFUL = 0.46  # mean golden energy over the validation, strangeness included, above which a start is not believed
 _SIDES: tuple[Side, Side] = ("right", "left")
 _INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convinces
-_CONVINCING = 0.4  # the same that ends the search at once …
+_CONVINCING = 0.4  # the same under which nothing better is looked for …
 _CLEAR_MARGIN = 0.03  # … when the other side is this much worse
 _VALIDATION_FRAMES = 16
-_SUGGESTION_ENOUGH = 0.35  # golden energy under which the network's suggestions need no search beside them
-_GOOD_PLACE = 0.4  # golden energy under which no farther place is looked at
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
-_PER_SIDE = 4
-_SEEN, _UNSEEN = 0.5, 0.2  # presence of a hand in a region, over which regions under the other are left out
-_APART = 0.025  # m of mean joint distance between two hypotheses worth following
 
 
 class Start(NamedTuple):
@@ -86,12 +81,6 @@ class Start(NamedTuple):
         return sentences[self.doubted]
 
 
-class _Hypothesis(NamedTuple):
-    shape: HandShape
-    pose: Array
-    energy: float
-
-
 class _Followed(NamedTuple):
     """A hypothesis that was tracked for some frames: its first frame, mean golden energy, lead over the other side."""
 
@@ -128,10 +117,10 @@ def find_start(
     network, _ = available_network()
     best: _Followed | None = None
     for attempt, (index, thorough) in enumerate(_attempts(len(frames), network is not None)):
-        if best is not None and (_clear(best) or (thorough and best.energy < DOUBTFUL)):
+        if best is not None and (_clear(best) or (thorough and best.energy < DOUBTFUL) or index > _INSTANTS[-1]):
             break
         report("Looking for a hand", min(0.1 * attempt, 0.5))
-        hypotheses = _hypotheses(frames[index], sides, shape, network, rng, thorough=thorough)
+        hypotheses = hypotheses_of(frames[index], sides, shape, network, rng, thorough=thorough)
         if not hypotheses:
             continue
         report("Following the hypotheses", min(0.1 * attempt + 0.05, 0.6))
@@ -172,14 +161,14 @@ def _attempts(count: int, quickly: bool) -> list[tuple[int, bool]]:
 def _best_followed(
     frames: Sequence[Frame],
     index: int,
-    hypotheses: list[_Hypothesis],
+    hypotheses: list[Hypothesis],
     shape: HandShape | None,
     rng: np.random.Generator,
 ) -> _Followed:
     """Track every hypothesis for some frames, at a size fitted to them, and return the one that explains them best."""
     network, _ = available_network()
     ahead = frames[index : index + _VALIDATION_FRAMES]
-    rated: list[tuple[float, _Hypothesis]] = []
+    rated: list[tuple[float, Hypothesis]] = []
     for hypothesis in hypotheses:
         fitted = hypothesis
         if shape is None:
@@ -188,7 +177,7 @@ def _best_followed(
             if not views:
                 continue
             sized, views, _ = fit_shape(views, hypothesis.shape, rng, iterations=4, refine=False)
-            fitted = _Hypothesis(sized, relative_to_camera(views[0].pose, views[0].reference), hypothesis.energy)
+            fitted = Hypothesis(sized, relative_to_camera(views[0].pose, views[0].reference), hypothesis.energy)
         infos = _track(fitted, ahead, rng)
         energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
         seen = [
@@ -209,7 +198,7 @@ def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
     """Track backwards from where the start was found for as long as the hand is there: (frame, pose, reference)."""
     backwards = [frames[index]._replace(time=-frames[index].time) for index in range(start.frame, -1, -1)]
     held, pose, reference = start.frame, start.pose, start.reference
-    tracked = _track(_Hypothesis(start.shape, start.pose, start.energy), backwards, rng, start.reference)
+    tracked = _track(Hypothesis(start.shape, start.pose, start.energy), backwards, rng, start.reference)
     for back, (_, state, info) in enumerate(tracked):
         if back > 0:
             if info.estimate_golden > 1.5 * start.energy + 0.1:
@@ -218,75 +207,8 @@ def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
     return held, pose, reference
 
 
-def _hypotheses(
-    frame: Frame,
-    sides: Sequence[Side],
-    shape: HandShape | None,
-    network: Network | None,
-    rng: np.random.Generator,
-    *,
-    thorough: bool,
-) -> list[_Hypothesis]:
-    """The best different hypotheses of each side, over the places where a hand may be.
-
-    The network's suggestions are polished; a thorough look searches the whole region besides where none convinces.
-    """
-    plane = find_plane(frame, rng)
-    regions = find_regions(frame, plane)
-    size = None if shape is None else shape.hand().length / load_hand(shape.side).length
-    looks = [] if network is None else [suggested(network, frame, region, sides, size) for region in regions]
-    regions, looks = _promising(regions, looks)
-    result: list[_Hypothesis] = []
-    for side in sides:
-        hand = shape.hand() if shape else load_hand(side)
-        settings = SearchSettings(scale_spread=0.0) if shape else SearchSettings()
-        found: list[_Hypothesis] = []
-        for number, region in enumerate(regions):
-            observation = observe(frame, region.centre, region.radius, plane=plane)
-            if observation.is_empty:
-                continue
-            for seeds in [*(looks[number][side] if looks else []), *([None] if thorough else [])]:
-                if seeds is None and min((h.energy for h in found), default=1.0) < _SUGGESTION_ENOUGH:
-                    break
-                for scale, pose, energy in locate(hand, observation, region.points, settings, rng, seeds):
-                    sized = shape or HandShape(side, scale=scale)
-                    charge = strangeness(network, frame, sized.hand(), pose, np.eye(3))
-                    found.append(_Hypothesis(sized, pose, energy + charge))
-            if min((h.energy for h in found), default=1.0) < _GOOD_PLACE:
-                break
-        result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
-    least = min((h.energy for h in result), default=0.0)
-    return [h for h in result if h.energy < 1.5 * least + 0.05]
-
-
-def _promising(
-    regions: list[Region], looks: list[dict[Side, list[Seeds]]]
-) -> tuple[list[Region], list[dict[Side, list[Seeds]]]]:
-    """Keep two regions, those in which the network sees a hand first; where it does, leave out those in which it sees none."""
-    if not looks:
-        return regions[:2], looks
-    presence = [max(seeds.presence for places in look.values() for seeds in places) for look in looks]
-    order = sorted(range(len(regions)), key=lambda number: presence[number] < _SEEN)[:2]
-    if max(presence) > _SEEN:
-        order = [number for number in order if presence[number] > _UNSEEN]
-    return [regions[number] for number in order], [looks[number] for number in order]
-
-
-def _different(hypotheses: list[_Hypothesis], most: int) -> list[_Hypothesis]:
-    kept: list[_Hypothesis] = []
-    places: list[Array] = []
-    for hypothesis in hypotheses:
-        joints = joints_of(load_hand(hypothesis.shape.side).scaled(hypothesis.shape.scale), hypothesis.pose)
-        if all(np.linalg.norm(joints - other, axis=1).mean() > _APART for other in places):
-            kept.append(hypothesis)
-            places.append(joints)
-        if len(kept) == most:
-            break
-    return kept
-
-
 def _track(
-    hypothesis: _Hypothesis, frames: Sequence[Frame], rng: np.random.Generator, reference: Array | None = None
+    hypothesis: Hypothesis, frames: Sequence[Frame], rng: np.random.Generator, reference: Array | None = None
 ) -> list[tuple[Observation, State, StepInfo]]:
     """Track a hypothesis with the default filter, until nothing is seen any more."""
     hand, settings = hypothesis.shape.hand(), smart.SpfSettings()
@@ -309,7 +231,7 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
     shape, pose, energy = start.shape, start.pose, start.energy
     for turn, (refine_all, iterations) in enumerate(((False, 3), (True, 6))):
         report("Calibrating the hand", 0.7 + 0.15 * turn)
-        tracked = _track(_Hypothesis(shape, pose, energy), ahead, rng)
+        tracked = _track(Hypothesis(shape, pose, energy), ahead, rng)
         every = max(1, len(tracked) // _VIEWS)
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
         shape, views, energy = fit_shape(views, shape, rng, iterations=iterations, refine=refine_all)
