@@ -45,6 +45,12 @@ class CorrectionSettings(Settings):
         choices=("fixed", "paper", "silverman"),
     )
     correction: bool = setting(True, "correct the weights of optimised samples (32)", group="Filter")
+    weighting: str = setting(
+        "window",
+        "optimised samples as they are, corrected with the window h, or drawn around themselves and weighed by the true ratio",
+        group="Filter",
+        choices=("window", "laplace"),
+    )
 
 
 def correct(predicted: Array, optimised: Array, scale: Array, settings: CorrectionSettings) -> tuple[float, Array]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.cost.problem import Problem, golden_of_many, make_problem
+from spf.filters import laplace
 from spf.filters.dynamics import DynamicsSettings, drift, noise_scale, predict
 from spf.filters.estimate import Samples, conclude
 from spf.filters.kde import CorrectionSettings, correct
@@ -101,11 +102,17 @@ def step(
         evaluations += mixed.evaluations
     clock("recombine")
     scale = noise_scale(hand, settings, interval)
-    window, log_c = correct(predicted, optimised, scale, settings)  # (d) combine, correct
+    log_prior = _log_prior(origins, settings)
+    if settings.weighting == "laplace":
+        centres = np.array([one.prior for one in descents])
+        optimised, log_c = _drawn(problem, predicted, optimised, centres, log_prior, scale, settings, rng)
+        window, log_prior = math.nan, np.zeros_like(log_prior)  # the prior is in the ratio
+    else:
+        window, log_c = correct(predicted, optimised, scale, settings)  # (d) combine, correct
     clock("correct")
     judged = judge(problem, np.concatenate([predicted, optimised]))
     likelihood = log_likelihood(judged, settings, settings.sigma2)
-    log_weights = normalise(log_c + likelihood + _log_prior(origins, settings))  # (e) weigh
+    log_weights = normalise(log_c + likelihood + log_prior)  # (e) weigh
     clock("weigh")
     jumped = np.array([origin in ("structured", "learned") for origin in origins])
     before[jumped] = optimised[jumped]  # a jump is no motion
@@ -118,6 +125,7 @@ def step(
 
 class _Descent(NamedTuple):
     start: Array
+    prior: Array
     end: Array
     trajectory: Trajectory | None
     evaluations: int
@@ -151,7 +159,7 @@ def _descend(
         end, trajectory, iterations = optimise(
             problem, settings, streams[index], start, prior=prior, precision=precision, effort=effort, record=record
         )
-        return _Descent(start, end, trajectory, iterations + renders)
+        return _Descent(start, prior, end, trajectory, iterations + renders)
 
     longest_first = sorted(range(len(predicted)), key=lambda index: origins[index] != "structured")
     done = dict(zip(longest_first, map_threads(run, longest_first), strict=True))
@@ -189,6 +197,22 @@ def _recombined(
     )  # fmt: skip
     evaluations = len(optimised) + renders + iterations
     return _Recombined(int(np.argmax(energies)), int(np.argmin(energies)), pose, trajectory, evaluations)
+
+
+def _drawn(
+    problem: Problem, predicted: Array, optima: Array, expected: Array, log_prior: Array, noise: Array,
+    settings: SpfSettings, rng: np.random.Generator,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Draw the optimised samples around the optima, and weigh all by the true ratio: (optimised (N, D), log f/q (2 N,))."""
+    precisions = laplace.precisions_at(problem, optima, settings.sigma2, noise)
+    optimised = problem.hand.constrain(laplace.draw(optima, precisions, rng))
+    samples, count = np.concatenate([predicted, optimised]), len(predicted)
+    ratio = laplace.log_ratio(
+        samples, expected, log_prior[count:], noise, optima, precisions, kept=settings.keep_predicted
+    )
+    if not settings.keep_predicted:
+        ratio[:count] = -np.inf
+    return optimised, ratio
 
 
 def _log_prior(origins: tuple[str, ...], settings: SpfSettings) -> Array:

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from spf.filters.kde import CorrectionSettings, correct
+from spf.filters.laplace import draw, log_ratio
 from spf.filters.particles import normalise, weighted_mean
 from spf.filters.resampling import ResamplingSettings, resample, resample_when_needed
 
@@ -81,6 +82,25 @@ def smart(
         samples = np.concatenate([predicted, optimised])
         log_weights = normalise(log_c + log_likelihood(samples, z))  # (e)
         posterior.append(moments(samples, log_weights))  # (f)
+    return Posterior(*(np.array(parts) for parts in zip(*posterior, strict=True)))
+
+
+def laplace_smart(seen: Array, rng: np.random.Generator, *, kept: bool) -> Posterior:
+    """The same with optimised samples drawn around the optima and weighed by the true ratio, f/q."""
+    samples, log_weights = rng.normal(size=(COUNT, 2)), np.full(COUNT, -np.log(COUNT))
+    precisions = np.repeat((np.diag(R**-2) + np.diag(Q**-2))[None], COUNT, axis=0)
+    posterior = []
+    for z in seen:
+        expected = samples[resample(log_weights, COUNT, ResamplingSettings(), rng)] @ F.T
+        predicted = expected + Q * rng.normal(size=expected.shape)
+        optima = descent(predicted, z)
+        drawn = draw(optima, precisions, rng)
+        samples = np.concatenate([predicted, drawn])
+        ratio = log_ratio(samples, expected, np.zeros(COUNT), Q, optima, precisions, kept=kept)
+        if not kept:
+            samples, ratio = drawn, ratio[COUNT:]
+        log_weights = normalise(ratio + log_likelihood(samples, z))
+        posterior.append(moments(samples, log_weights))
     return Posterior(*(np.array(parts) for parts in zip(*posterior, strict=True)))
 
 
@@ -160,3 +180,13 @@ def test_without_correction_the_posterior_is_altered(seen: Array, rng: np.random
     assert mean > 3 * WITHIN[0]
     assert variance > 3 * WITHIN[1]
     assert np.linalg.norm(found.mean - seen, axis=1).mean() < 0.8 * np.linalg.norm(exact.mean - seen, axis=1).mean()
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_drawn_around_the_optima_the_posterior_is_the_kalman_filters(
+    seen: Array, rng: np.random.Generator, kept: bool
+) -> None:
+    """Without a kernel there is no width that flattens the density: the same bounds as without an optimiser."""
+    mean, variance = distance(laplace_smart(seen, rng, kept=kept), kalman(seen))
+    assert mean < WITHIN[0]
+    assert variance < WITHIN[1]

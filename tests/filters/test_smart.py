@@ -50,6 +50,23 @@ def test_a_step_tells_everything_that_happened(session) -> None:  # type: ignore
     assert info.cost_after.mean() < info.cost_before.mean()
 
 
+def test_drawn_samples_hold_the_hand_and_have_weights_of_their_own(session) -> None:  # type: ignore[no-untyped-def]
+    hand, state, observation = _first(session)
+    settings = _SETTINGS.replace(weighting="laplace")
+    _, info = smart.step(np.random.default_rng(0), state, observation, hand, settings, record=True)
+    assert np.isnan(info.window)
+    assert np.exp(info.log_weights).sum() == pytest.approx(1.0)
+    ends = np.array([trace.poses[-1] for trace in info.trajectories])
+    assert (np.abs(info.optimised - ends).max(axis=1) > 1e-4).all()  # drawn around the optima, not the optima
+    start = Start(
+        0, session[0].truth.pose, session[0].truth.orientation, HandShape.from_dict(session.hand_shape), 0.2, 1.0
+    )
+    tracking, track = begin("spf", make_settings("spf").replace(weighting="laplace"), start, 0, time=session[0].time)
+    for index in range(8):
+        track, result = track_frame(tracking, track, session[index])
+    assert np.linalg.norm(result.joints - session[7].truth.joints, axis=1).mean() < 0.012
+
+
 def test_a_step_is_a_function_of_its_arguments(session) -> None:  # type: ignore[no-untyped-def]
     hand, state, observation = _first(session)
     first, second = (smart.step(np.random.default_rng(5), state, observation, hand, _SETTINGS)[0] for _ in range(2))
