@@ -15,6 +15,7 @@ import numpy as np
 
 from spf.sessions import Session, open_session
 from spf.synthetic import MOTIONS, SyntheticSettings, synthesise
+from spf.synthetic import SENSORS as ALL_SENSORS
 
 __all__ = ["KINDS", "SENSORS", "SHAPES", "Kind", "Source", "open_source", "recordings", "session_settings", "synthetic"]
 
@@ -34,6 +35,7 @@ class Kind(NamedTuple):
         clutter: what else is in the scene.
         away: whether the hand leaves in the middle and comes back.
         turned: whether the palm is turned anyhow, and tipped and rolled far more than a hand held up is.
+        every: whether the numbers go through all pairs of a motion and one of all sensors.
     """
 
     speed_mm: float
@@ -42,6 +44,7 @@ class Kind(NamedTuple):
     clutter: str = "forearm"
     away: bool = False
     turned: bool = False
+    every: bool = False
 
 
 KINDS: dict[str, Kind] = {
@@ -55,6 +58,7 @@ KINDS: dict[str, Kind] = {
     "face": Kind(9.0, "a face beside and behind the hand", clutter="face"),
     "second_hand": Kind(9.0, "another hand beside it", clutter="second_hand"),
     "away": Kind(9.0, "the hand leaves the view and comes back", away=True),
+    "every": Kind(9.0, "every motion with every sensor, 45 in a row", every=True),
 }
 
 
@@ -102,6 +106,8 @@ def session_settings(kind: str, number: int, frames: int) -> SyntheticSettings:
     chosen, tag = KINDS[kind], zlib.crc32(kind.encode())
     motion = _dealt(list(MOTIONS), number, tag, 0)
     sensor, shape = _dealt(list(itertools.product(SENSORS, SHAPES)), number, tag, 1)
+    if chosen.every:
+        motion, sensor = list(itertools.product(MOTIONS, ALL_SENSORS))[number % (len(MOTIONS) * len(ALL_SENSORS))]
     rng = np.random.default_rng([tag, 2, number])
     settings = SyntheticSettings(
         motion=motion, sensor=sensor, shape=shape, clutter=chosen.clutter, frames=frames, speed_mm=chosen.speed_mm,

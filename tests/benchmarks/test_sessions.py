@@ -8,6 +8,7 @@ import pytest
 from benchmarks.holds.kidnaps import kidnapped
 from benchmarks.holds.sessions import KINDS, SENSORS, SHAPES, recordings, session_settings, synthetic
 from spf.synthetic import MOTIONS, synthesise
+from spf.synthetic import SENSORS as ALL_SENSORS
 
 
 def test_a_session_is_its_number_whatever_else_is_asked_for():
@@ -26,6 +27,11 @@ def test_motions_sensors_and_shapes_are_dealt_evenly():
     assert pairs == {(sensor, shape) for sensor in SENSORS for shape in SHAPES}
     assert {s.side for s in chosen} == {"left", "right"}
     assert len({s.seed for s in chosen}) == len(chosen)
+
+
+def test_every_motion_is_seen_by_every_sensor():
+    chosen = [session_settings("every", number, 60) for number in range(45)]
+    assert {(s.motion, s.sensor) for s in chosen} == {(motion, sensor) for motion in MOTIONS for sensor in ALL_SENSORS}
 
 
 @pytest.mark.parametrize("kind", KINDS)
