@@ -10,7 +10,7 @@ import typer
 
 from spf.cli.console import check_output, progress_bar
 from spf.cli.sessions import Force
-from spf.errors import SettingError
+from spf.errors import RunError, SettingError
 from spf.export import VIEWS, View, write_film, write_picture, write_table
 from spf.export.tables import TABLES
 from spf.render import Renderer
@@ -46,6 +46,11 @@ def report(
         raise SettingError("--session and --no-session exclude each other: leave one out.")
     check_output(output, force)
     run = read_run(directory)
+    if session is None and not no_session and not Path(run.manifest["session"]["uri"]).exists():
+        raise RunError(
+            f"The session of this run, {run.manifest['session']['uri']}, is gone: name where it lies with --session, or "
+            "report only what the track says with --no-session."
+        )
     with progress_bar() as progress:
         if no_session:
             write_report(run, None, output, None, directory=str(directory), progress=progress)

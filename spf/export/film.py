@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 _BAR = 36  # pixels of the line of text
 _DARK, _LIGHT, _LOST = (25, 29, 34), (222, 227, 232), (255, 150, 90)
+_ROOM = 1.05  # of the joints: the skin reaches beyond them
 _STEADY = 15  # frames over which the eye's movement is evened out
 _MULTIPLE = 16  # sides of a film are multiples of it, so that every player takes them
 
@@ -110,14 +111,15 @@ def _pictures(
 
 
 def _steady_views(track: Track, view: View) -> list[ViewCamera]:
-    """One view a frame: of one size, around a centre that moves evenly."""
+    """One view a frame: of one size that the hand stays in, around a centre that moves evenly."""
     centres = uniform_filter1d(track.joints.mean(axis=1), _STEADY, axis=0, mode="nearest")
-    own = [view_around(joints, view) for joints in track.joints]
-    extent = float(np.percentile([camera.extent for camera in own], 90))
-    distance = float(np.median([camera.distance for camera in own]))
+    reach = np.linalg.norm(track.joints - centres[:, None], axis=2).max(axis=1)
+    base = view_around(track.joints[0], view)
+    extent = max(2 * _ROOM * float(np.percentile(reach, 95)), base.extent)
+    distance = float(np.median(np.linalg.norm(centres, axis=1)))
     return [
-        camera._replace(focal_point=(float(x), float(y), float(z)), extent=extent, distance=distance)
-        for camera, (x, y, z) in zip(own, centres, strict=True)
+        base._replace(focal_point=(float(x), float(y), float(z)), extent=extent, distance=distance)
+        for x, y, z in centres
     ]
 
 
