@@ -9,6 +9,8 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from app import moves
+from app.clock import Clock
 from app.lane import Lane, Origin
 from app.results import Entry, entry_of
 from app.runner import CancelledError, Report, Runner
@@ -93,45 +95,105 @@ class Controller:
 
         return work
 
+    # ---- moving over the frames
+
     async def step(self) -> None:
-        """Go on by one frame: track it, or show it again if it was tracked with the present settings."""
+        """Go on by one frame: show it if it was tracked, else track it."""
         if self.state.busy:
             return
         async with self._doing("") as wanted:
             await self._advance(wanted)
 
     async def play(self) -> None:
-        """Step until the end of the session or until paused."""
+        """Play what was tracked and go on tracking, until the end of the range or session or until paused; or in a loop."""
         state = self.state
-        if state.busy or state.next_frame is None:
+        if state.busy or state.session is None:
             return
-        state.playing = True
+        if state.next_frame is None or (state.span and state.frame >= state.span[1]):
+            if state.last is None:
+                return
+            state.show(moves.first(state))
+        state.playing, pace = True, moves.Pace()
         async with self._doing("") as wanted:
             try:
-                while state.playing and await self._advance(wanted):
+                while state.playing and await self._onward(wanted, pace):
                     await self.drawn()
             finally:
                 if wanted():
                     state.playing = False
 
+    async def _onward(self, wanted: Wanted, pace: moves.Pace) -> bool:
+        """Show the next frame of play; False when there is none."""
+        state = self.state
+        assert state.session is not None
+        times = state.session.times
+        stride, wait = pace.due(state.speed * (len(times) - 1) / max(float(times[-1]), 1e-3))
+        index = moves.played(state, stride)
+        if index is None:
+            is_over = state.loop or (state.span and state.frame >= state.span[1])
+            return False if is_over else await self._advance(wanted)
+        await asyncio.sleep(wait)
+        if not wanted() or not state.playing:
+            return False
+        state.show(index)
+        return True
+
     def pause(self) -> None:
         """Stop after the frame in flight."""
         self.state.playing = False
 
+    def look(self, frame: int) -> None:
+        """Show a frame, tracked or not; what runs in the background goes on, but play stops."""
+        state = self.state
+        if state.session is None or frame == state.frame:
+            return
+        state.playing = False
+        state.show(min(max(frame, 0), len(state.session) - 1))
+
+    async def forward(self) -> None:
+        """Show the next frame, tracking it if it comes right after what was tracked."""
+        state = self.state
+        if state.task and state.last is not None and state.frame < state.last:
+            self.look(state.frame + 1)
+        elif not state.playing:
+            await self.step()
+
+    def back(self) -> None:
+        """Show the frame before."""
+        self.look(self.state.frame - 1)
+
+    def first(self) -> None:
+        """Show the first frame of the range or of what was tracked."""
+        self.look(moves.first(self.state))
+
+    def last(self) -> None:
+        """Show the last frame that was tracked."""
+        self.look(moves.last(self.state))
+
+    def worst(self) -> None:
+        """Show the worst frame."""
+        frame = moves.worst(self.state)
+        if frame is not None:
+            self.look(frame)
+
+    def next_loss(self) -> None:
+        """Show where the hand is lost next."""
+        frame = moves.next_loss(self.state)
+        if frame is not None:
+            self.look(frame)
+
     async def jump(self, frame: int) -> None:
         """Show a frame; one beyond what was tracked is tracked forward to, if there is a start."""
         state = self.state
-        if state.session is None or frame == state.frame:
+        if state.session is None or (frame == state.frame and state.is_tracked):
             return
         self.cancel()
         last = state.last
         if last is None or frame <= last:
             state.show(frame)
             return
-        async with self._doing(f"Tracking to frame {frame}") as wanted:
-            state.show(last)
-            while state.frame < frame and await self._advance(wanted):
-                state.share = (state.frame - last) / (frame - last)
+        state.show(last)
+        await self._reach(range(last + 1, frame + 1))
 
     async def restart(self) -> None:
         """Go back to the first frame of the run and track it anew with the present settings."""
@@ -169,20 +231,24 @@ class Controller:
         if state.origin is None or state.is_tracked or state.frame < state.origin.start.frame:
             return
         self.cancel()
-        goal = state.frame
         first = state.origin.start.frame if state.last is None else state.last + 1
-        async with self._doing(f"Tracking to frame {goal}") as wanted:
-            for index in range(first, goal + 1):
-                behind = [lane for lane in state.active if lane.summary(index) is None]
-                await self._track(index, behind, wanted)
-                state.share = (index + 1 - first) / (goal + 1 - first)
-            state.show(goal)
+        await self._reach(range(first, state.frame + 1))
+
+    async def _reach(self, frames: range) -> None:
+        """Track frames in the lanes shown that have not, following with the page while it is at the last one tracked."""
+        state, clock = self.state, Clock(len(frames))
+        async with self._doing(f"Tracking to frame {frames[-1]}") as wanted:
+            for done, index in enumerate(frames, 1):
+                shown = state.frame
+                await self._track(index, [lane for lane in state.active if lane.summary(index) is None], wanted)
+                state.show(index if shown == index - 1 else state.frame)
+                state.param.update(share=done / len(frames), left=clock.left(done))
 
     def cancel(self) -> None:
         """Give up what runs in the background; everything tracked so far stays."""
         self._turn += 1
         self._runner.cancel()
-        self.state.param.update(playing=False, task="", share=0.0)
+        self.state.param.update(playing=False, task="", share=0.0, left="")
 
     def close(self) -> None:
         """The page is gone."""
@@ -195,12 +261,12 @@ class Controller:
         async with self._advancing:  # clicks that come faster than frames are done one after the other
             if not wanted():
                 raise CancelledError
-            index = state.next_frame
+            index, shown = state.next_frame, state.frame
             if index is None:
                 return False
-            behind = [lane for lane in state.active if not lane.is_current(index)]
-            await self._track(index, behind, wanted)
-            state.show(index)
+            await self._track(index, [lane for lane in state.active if lane.summary(index) is None], wanted)
+            if state.frame == shown:  # nobody has looked elsewhere meanwhile
+                state.show(index)
             return True
 
     async def _track(self, index: int, lanes: list[Lane], wanted: Wanted) -> None:
@@ -231,7 +297,7 @@ class Controller:
             A function that tells whether it is still wanted: nobody has cancelled it.
         """
         state, turn = self.state, self._turn
-        state.param.update(task=task, share=0.0, error="")
+        state.param.update(task=task, share=0.0, left="", error="")
         try:
             yield lambda: self._turn == turn
         except CancelledError:
@@ -244,7 +310,7 @@ class Controller:
                 f"Something unexpected went wrong ({type(error).__name__}: {error}); the server's log says more."
             )
         if self._turn == turn:
-            state.param.update(task="", share=0.0)
+            state.param.update(task="", share=0.0, left="")
 
 
 def _frame_work(

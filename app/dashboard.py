@@ -66,9 +66,10 @@ def page() -> pmu.Page:
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
         title=_TITLE, header=[modes.switch(controller.show_mode), Status(state, controller.cancel).panel],
-        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=False,
+        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip
+    built.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     with param.edit_constant(built):
         built.busy = False  # it follows every message otherwise, and the browser lays the whole page out anew each time
     return built

@@ -80,11 +80,6 @@ class Lane(param.Parameterized):
         """Return a frame's summary, or None when it was not tracked."""
         return self.results.summary(frame)
 
-    def is_current(self, frame: int) -> bool:
-        """Tell whether a frame's stored result is what a step with the present settings may show again."""
-        entry = self.results.entry(frame)
-        return entry is not None and same_rules(entry.tracking, self.tracker, self.settings)
-
     @property
     def is_mixed(self) -> bool:
         """Whether some of what was tracked was tracked with other settings than the present ones."""

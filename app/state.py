@@ -57,12 +57,17 @@ class State(param.Parameterized):
     rules: int = param.Integer(0)
 
     playing: bool = param.Boolean(False)
+    speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")
+    loop: bool = param.Boolean(False, doc="whether play begins again at the end of what was tracked")
+    span: tuple[int, ...] = param.ClassSelector(class_=tuple, default=(), doc="first and last frame played, or nothing")
     task: str = param.String("", doc="what is being done in the background, or nothing")
     share: float = param.Number(0.0, bounds=(0.0, 1.0), doc="of the task that is done")
+    left: str = param.String("", doc="how long the task still takes, in words, or nothing")
     preparing: str = param.String("", doc="what the server does before it is quick, or nothing")
     error: str = param.String("")
     warning: str = param.String("")
 
+    dark: bool = param.Boolean(False, doc="whether the page is dark")
     with_truth: bool = param.Boolean(True, doc="whether the truth is drawn too")
     azimuth: float = param.Number(0.0)
     elevation: float = param.Number(0.0)
@@ -134,7 +139,7 @@ class State(param.Parameterized):
             lane.clear()
         init = "auto" if self.init == "truth" and not session.has_truth else self.init
         self.param.update(
-            session=session, frame=0, origin=None, init=init, error="", warning="", playing=False,
+            session=session, frame=0, origin=None, init=init, error="", warning="", playing=False, span=(),
             revision=self.revision + 1,
         )  # fmt: skip
 
@@ -159,6 +164,15 @@ class State(param.Parameterized):
     def show(self, frame: int) -> None:
         """Show a frame, and what was tracked in it."""
         self.param.update(frame=frame, revision=self.revision + 1)
+
+    def span_from(self, frame: int) -> None:
+        """Play from a frame on, to the end of the range if that comes after it."""
+        last = len(self.session) - 1 if self.session is not None else frame
+        self.span = (frame, self.span[1] if self.span and self.span[1] >= frame else last)
+
+    def span_to(self, frame: int) -> None:
+        """Play to a frame, from the beginning of the range if that comes before it."""
+        self.span = (self.span[0] if self.span and self.span[0] <= frame else 0, frame)
 
     @property
     def busy(self) -> bool:
