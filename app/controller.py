@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TypeVar
 
 from app import moves
 from app.clock import Clock
+from app.keeper import Keeper
 from app.lane import Lane, Origin
 from app.results import Entry, entry_of
 from app.runner import CancelledError, Report, Runner
@@ -48,6 +49,7 @@ class Controller:
         open_: opens a session by path and camera file.
         drawn: waits until the browser has shown the latest frame, so that playing never piles up frames.
         kernels: waits in the worker until the kernels are compiled, and reports meanwhile.
+        keeper: keeps what was tracked on disk; without it nothing is kept.
     """
 
     def __init__(
@@ -57,25 +59,30 @@ class Controller:
         open_: Open = open_session,
         drawn: Callable[[], Awaitable[None]] = _at_once,
         kernels: Wait = _ready,
+        keeper: Keeper | None = None,
     ) -> None:
-        self.state, self._runner, self._open, self.drawn, self._kernels = state, runner, open_, drawn, kernels
+        self.state, self._runner, self.opener, self.drawn, self._kernels = state, runner, open_, drawn, kernels
+        self.keeper = keeper or Keeper(state, None)
         self._turn = 0  # counts what was cancelled, so that an action knows when it no longer is the one that runs
         self._advancing = asyncio.Lock()
 
     async def open(self, uri: str, camera: str = "") -> None:
         """Open a session; the one before stays when it cannot be."""
         self.cancel()
-        async with self._doing("Opening the session"):
+        async with self.doing("Opening the session"):
             if not uri.strip():
                 raise StartError("Type the path of a session first: a file or a folder.")
-            session = await self._run(lambda _report: self._open(uri.strip(), camera.strip() or None))
-            self.state.load(session)
+            session = await self.run(lambda _report: self.opener(uri.strip(), camera.strip() or None))
+            await self.keeper.keep()
+            self.state.load(session, camera.strip())
 
     async def start(self) -> None:
         """Find the first pose as chosen and track the first frame."""
         self.cancel()
-        async with self._doing("Finding the first pose") as wanted:
-            self.state.begin(await self._run(self._preparation()))
+        async with self.doing("Finding the first pose") as wanted:
+            origin = await self.run(self._preparation())
+            await self.keeper.keep()
+            self.state.begin(origin)
             await self._advance(wanted)
 
     def _preparation(self) -> Callable[[Report], Origin]:
@@ -101,7 +108,7 @@ class Controller:
         """Go on by one frame: show it if it was tracked, else track it."""
         if self.state.busy:
             return
-        async with self._doing("") as wanted:
+        async with self.doing("") as wanted:
             await self._advance(wanted)
 
     async def play(self) -> None:
@@ -114,7 +121,7 @@ class Controller:
                 return
             state.show(moves.first(state))
         state.playing, pace = True, moves.Pace()
-        async with self._doing("") as wanted:
+        async with self.doing("") as wanted:
             try:
                 while state.playing and await self._onward(wanted, pace):
                     await self.drawn()
@@ -193,7 +200,7 @@ class Controller:
             state.show(frame)
             return
         state.show(last)
-        await self._reach(range(last + 1, frame + 1))
+        await self.reach(range(last + 1, frame + 1))
 
     async def restart(self) -> None:
         """Go back to the first frame of the run and track it anew with the present settings."""
@@ -201,7 +208,8 @@ class Controller:
         if state.origin is None:
             return
         self.cancel()
-        async with self._doing("") as wanted:
+        async with self.doing("") as wanted:
+            await self.keeper.keep()
             state.rewind()
             await self._advance(wanted)
 
@@ -232,17 +240,25 @@ class Controller:
             return
         self.cancel()
         first = state.origin.start.frame if state.last is None else state.last + 1
-        await self._reach(range(first, state.frame + 1))
+        await self.reach(range(first, state.frame + 1))
 
-    async def _reach(self, frames: range) -> None:
-        """Track frames in the lanes shown that have not, following with the page while it is at the last one tracked."""
+    async def reach(self, frames: range, lanes: Sequence[Lane] = ()) -> None:
+        """Track frames in lanes (those shown) that have not, following with the page while it is at the last one tracked."""
         state, clock = self.state, Clock(len(frames))
-        async with self._doing(f"Tracking to frame {frames[-1]}") as wanted:
+        async with self.doing(f"Tracking to frame {frames[-1]}") as wanted:
             for done, index in enumerate(frames, 1):
                 shown = state.frame
-                await self._track(index, [lane for lane in state.active if lane.summary(index) is None], wanted)
-                state.show(index if shown == index - 1 else state.frame)
+                behind = [lane for lane in lanes or state.active if lane.summary(index) is None]
+                await self.track(index, behind, wanted)
+                state.show(index if shown in (index - 1, index) else state.frame)
                 state.param.update(share=done / len(frames), left=clock.left(done))
+                self.keeper.keep_sometimes(index)
+
+    async def once_more(self, index: int, lane: Lane, *, other_seed: bool) -> None:
+        """Track one frame in one lane, with its seed or the next."""
+        async with self.doing(f"Tracking frame {index} again") as wanted:
+            await self.track(index, [lane], wanted, seed=1 if other_seed else 0)
+            self.state.show(index)
 
     def cancel(self) -> None:
         """Give up what runs in the background; everything tracked so far stays."""
@@ -253,6 +269,7 @@ class Controller:
     def close(self) -> None:
         """The page is gone."""
         self.cancel()
+        self.keeper.close()
         self._runner.close()
 
     async def _advance(self, wanted: Wanted) -> bool:
@@ -264,33 +281,40 @@ class Controller:
             index, shown = state.next_frame, state.frame
             if index is None:
                 return False
-            await self._track(index, [lane for lane in state.active if lane.summary(index) is None], wanted)
+            await self.track(index, [lane for lane in state.active if lane.summary(index) is None], wanted)
             if state.frame == shown:  # nobody has looked elsewhere meanwhile
                 state.show(index)
             return True
 
-    async def _track(self, index: int, lanes: list[Lane], wanted: Wanted) -> None:
-        """Track a frame in some lanes: in all of them or in none."""
+    async def track(self, index: int, lanes: list[Lane], wanted: Wanted, seed: int = 0) -> None:
+        """Track a frame in some lanes, in all of them or in none; ``seed`` is added to theirs."""
         if not wanted():
             raise CancelledError
         state = self.state
         assert state.session is not None
         assert state.origin is not None
+        lanes = [lane for lane in lanes if lane.begins(state.origin) <= index]
         if not lanes:
             return
-        plans = [lane.before(index, state.origin) for lane in lanes]
-        frame, entries = await self._run(_frame_work(state.session, index, plans))
+        for lane in lanes:
+            self.keeper.before_change(lane, index)
+        plans = [
+            (tracking._replace(seed=tracking.seed + seed), before)
+            for tracking, before in (lane.before(index, state.origin) for lane in lanes)
+        ]
+        frame, entries = await self.run(_frame_work(state.session, index, plans))
         for lane, entry in zip(lanes, entries, strict=True):
             lane.results.add(entry, frame)
 
-    async def _run(self, work: Callable[[Report], T]) -> T:
+    async def run(self, work: Callable[[Report], T]) -> T:
+        """Do work in the page's worker, and show what it reports."""
         return await self._runner.run(work, self._watch)
 
     def _watch(self, text: str, share: float) -> None:
         self.state.param.update(task=text, share=min(max(share, 0.0), 1.0))
 
     @asynccontextmanager
-    async def _doing(self, task: str) -> AsyncIterator[Wanted]:
+    async def doing(self, task: str) -> AsyncIterator[Wanted]:
         """Say what is being done meanwhile, and afterwards in one sentence what went wrong.
 
         Yields:
@@ -301,6 +325,7 @@ class Controller:
         try:
             yield lambda: self._turn == turn
         except CancelledError:
+            self.keeper.keep_soon()
             return  # whoever cancelled has set the state already, and may be doing something else by now
         except SpfError as error:
             state.error = str(error)
@@ -311,6 +336,7 @@ class Controller:
             )
         if self._turn == turn:
             state.param.update(task="", share=0.0, left="")
+        self.keeper.keep_soon()
 
 
 def _frame_work(
@@ -323,7 +349,7 @@ def _frame_work(
         for tracking, before in plans:
             report("", 0.0)  # ends the work here if it was cancelled
             after, result = track_frame(tracking, before, frame, record=True)
-            entries.append(entry_of(result, after, tracking))
+            entries.append(entry_of(result, after, tracking, before))
         return frame, entries
 
     return work

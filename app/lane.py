@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import param
@@ -9,11 +10,12 @@ import param
 from app.results import Entry, Results, Summary, same_rules
 from spf.errors import StartError
 from spf.initialise import Start
+from spf.manifest import Plan
 from spf.settings import Settings
 from spf.track import Tracking, TrackState, begin
 from spf.trackers import PRESETS, TRACKERS, make_settings
 
-__all__ = ["Lane", "Origin"]
+__all__ = ["Folder", "Lane", "Origin"]
 
 
 class Origin(NamedTuple):
@@ -22,6 +24,21 @@ class Origin(NamedTuple):
     start: Start
     time: float
     seed: int
+
+
+@dataclasses.dataclass
+class Folder:
+    """Where a run is kept.
+
+    Attributes:
+        run: name on the shelf; nothing before it was kept.
+        kept: number of the frame after the last one that is on disk.
+        owned: whether this page made it; what was opened is not written to.
+    """
+
+    run: str = ""
+    kept: int = 0
+    owned: bool = True
 
 
 class Lane(param.Parameterized):
@@ -35,6 +52,9 @@ class Lane(param.Parameterized):
         super().__init__(tracker=tracker, settings=make_settings(tracker))
         self.colour = colour
         self.results = Results()
+        self.folder = Folder()
+        self.label = ""  # that a visitor gave the run
+        self.reopened: Origin | None = None  # where a run that was read from disk began
         self.param.watch(self._take_preset, ["tracker", "preset"])
 
     def _take_preset(self, *_events: Any) -> None:
@@ -68,9 +88,27 @@ class Lane(param.Parameterized):
 
     # ---- the run
 
+    def take(self, run: str, plan: Plan, results: Results, origin: Origin, label: str) -> None:
+        """Show a run that was read from disk; its settings are those that it ended with."""
+        ended = results.summaries[-1].tracking
+        self.param.update(tracker=ended.tracker, preset=plan.preset if plan.preset in PRESETS else "default")
+        self.settings = ended.settings
+        self.results, self.reopened, self.label = results, origin, label
+        self.folder = Folder(run, (results.last or 0) + 1, owned=False)
+
     def clear(self) -> None:
-        """Drop what was tracked."""
-        self.results = Results()
+        """Begin another run, with nothing tracked; what was kept of the last one stays where it is."""
+        self.results, self.reopened = Results(), None
+        self.fork()
+
+    def fork(self) -> None:
+        """Go on as another run, which is kept in a folder of its own."""
+        self.folder, self.label = Folder(), ""
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether all that was tracked is on disk."""
+        return self.results.last is None or self.folder.kept == self.results.last + 1
 
     def entry(self, frame: int) -> Entry | None:
         """Return everything of a frame, or None when it was not tracked or is no longer in memory."""
@@ -96,15 +134,33 @@ class Lane(param.Parameterized):
         Raises:
             StartError: the frame before it was not tracked, or is no longer in memory.
         """
+        origin = self.reopened or origin
         if frame == origin.start.frame:
             return begin(self.tracker, self.settings, origin.start, origin.seed, time=origin.time)
-        entry = self.results.entry(frame - 1)
-        if entry is None:
+        state, summary = self.results.state(frame - 1), self.results.summary(frame - 1)
+        if state is None or summary is None:
             raise StartError(
                 f"The particles of frame {frame - 1} are no longer in memory: go on from the last tracked frame, "
                 "or restart."
             )
-        return entry.tracking._replace(tracker=self.tracker, settings=self.settings), entry.state
+        return summary.tracking._replace(tracker=self.tracker, settings=self.settings), state
+
+    def begins(self, origin: Origin) -> int:
+        """Return the first frame that is tracked."""
+        return (self.reopened or origin).start.frame
+
+    def way_to(self, frame: int, origin: Origin) -> tuple[int, Tracking, TrackState]:
+        """Return where to begin to track a frame again as it was tracked: first frame, how, and the state before it."""
+        origin = self.reopened or origin
+        for index in range(frame, origin.start.frame, -1):
+            state, summary = self.results.state(index - 1), self.results.summary(index)
+            if state is not None and summary is not None:
+                return index, summary.tracking, state
+        first = self.results.summary(origin.start.frame)
+        assert first is not None
+        how = first.tracking
+        _, state = begin(how.tracker, how.settings, origin.start, how.seed, time=origin.time)
+        return origin.start.frame, how, state
 
 
 def _short(value: Any) -> str:

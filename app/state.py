@@ -41,6 +41,7 @@ class State(param.Parameterized):
     """
 
     session: Session | None = param.ClassSelector(class_=Session, doc="what is tracked")
+    camera: str = param.String("", doc="camera file that the session was opened with")
     frame: int = param.Integer(0, bounds=(0, None), doc="index of the frame shown")
     origin: Origin | None = param.ClassSelector(class_=Origin, doc="where all lanes begin; None before Start")
     revision: int = param.Integer(0)
@@ -55,6 +56,7 @@ class State(param.Parameterized):
     lanes: tuple[Lane, ...] = param.ClassSelector(class_=tuple, default=())
     lane: Lane = param.ClassSelector(class_=Lane, doc="the one whose settings are edited, and that is shown alone")
     rules: int = param.Integer(0)
+    shelf: int = param.Integer(0, doc="counts up when a run was kept, named or deleted")
 
     playing: bool = param.Boolean(False)
     speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")
@@ -133,13 +135,13 @@ class State(param.Parameterized):
 
     # ---- the run
 
-    def load(self, session: Session) -> None:
+    def load(self, session: Session, camera: str = "") -> None:
         """Show a session from its first frame, with nothing tracked."""
         for lane in self.lanes:
             lane.clear()
         init = "auto" if self.init == "truth" and not session.has_truth else self.init
         self.param.update(
-            session=session, frame=0, origin=None, init=init, error="", warning="", playing=False, span=(),
+            session=session, camera=camera, frame=0, origin=None, init=init, error="", warning="", playing=False, span=(),
             revision=self.revision + 1,
         )  # fmt: skip
 

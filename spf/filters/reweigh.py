@@ -81,7 +81,7 @@ def reweigh(
     ):  # Condensation and the annealed filter compare the same vertices everywhere
         order = rng.permutation(len(hand.skin.vertices)).astype(np.int32)
     sigma2 = float(getattr(settings, "sigma2", SIGMA2))
-    judged = judge(problem, poses, order, render=settings.golden > 0.0 or np.isfinite(info.golden).all())
+    judged = judge(problem, poses, order, render=settings.golden > 0.0 or bool(np.isfinite(info.golden).all()))
     likelihood = log_likelihood(judged, settings, sigma2)
     exponent = info.layers[-1].exponent if info.layers else 1.0
     before = info.log_likelihood
