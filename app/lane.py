@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from typing import Any, NamedTuple
 
 import param
 
+from app.presets import Presets
 from app.results import Entry, Results, Summary, same_rules
 from spf.errors import StartError
 from spf.initialise import Start
 from spf.manifest import Plan
 from spf.settings import Settings
 from spf.track import Tracking, TrackState, begin
-from spf.trackers import PRESETS, TRACKERS, make_settings
+from spf.trackers import TRACKERS, make_settings
 
 __all__ = ["Folder", "Lane", "Origin"]
+
+
+_ONE_MOVE = 1.0  # s
 
 
 class Origin(NamedTuple):
@@ -45,20 +50,33 @@ class Lane(param.Parameterized):
     """A tracker and its run. A tracker or preset that is picked brings its own values along."""
 
     tracker: str = param.Selector(default="spf", objects=list(TRACKERS))
-    preset: str = param.Selector(default="default", objects=list(PRESETS))
+    preset: str = param.String("default")
     settings: Settings = param.ClassSelector(class_=Settings)
 
-    def __init__(self, tracker: str = "spf", colour: str = "") -> None:
+    def __init__(self, tracker: str = "spf", colour: str = "", presets: Presets | None = None) -> None:
         super().__init__(tracker=tracker, settings=make_settings(tracker))
         self.colour = colour
         self.results = Results()
+        self.presets = presets or Presets()
+        self._undo: list[Settings] = []
+        self._last = ("", 0.0)  # setting that was changed last, and when
         self.folder = Folder()
         self.label = ""  # that a visitor gave the run
         self.reopened: Origin | None = None  # where a run that was read from disk began
         self.param.watch(self._take_preset, ["tracker", "preset"])
 
-    def _take_preset(self, *_events: Any) -> None:
-        self.settings = make_settings(self.tracker, self.preset)
+    def _take_preset(self, *events: Any) -> None:
+        if any(event.name == "tracker" for event in events):
+            self._undo.clear()
+            if self.preset not in self.presets.names(self.tracker):
+                self.preset = "default"  # a saved preset is of one tracker
+                return
+        else:
+            self._undo.append(self.settings)
+        self.settings = self._preset_settings()
+
+    def _preset_settings(self) -> Settings:
+        return self.presets.settings(self.tracker, self.preset)
 
     # ---- settings
 
@@ -68,7 +86,23 @@ class Lane(param.Parameterized):
         Raises:
             SettingError: there is no such setting, or the value is out of range.
         """
-        self.settings = self.settings.replace(**{name: value})
+        changed = self.settings.replace(**{name: value})
+        now = time.monotonic()
+        if self._last[0] != name or now - self._last[1] > _ONE_MOVE:  # a slider that is dragged is one change
+            self._undo.append(self.settings)
+        self._last = name, now
+        self.settings = changed
+
+    @property
+    def can_undo(self) -> bool:
+        """Whether a setting was changed."""
+        return bool(self._undo)
+
+    def undo(self) -> None:
+        """Take the last change of a setting back."""
+        if self._undo:
+            self._last = ("", 0.0)
+            self.settings = self._undo.pop()
 
     def back_to_preset(self) -> None:
         """Undo every change of a setting."""
@@ -77,7 +111,7 @@ class Lane(param.Parameterized):
     @property
     def differences(self) -> dict[str, tuple[Any, Any]]:
         """Settings that differ from the preset: name → (preset's value, value)."""
-        preset = make_settings(self.tracker, self.preset).to_dict()
+        preset = self._preset_settings().to_dict()
         return {name: (preset[name], value) for name, value in self.settings.to_dict().items() if value != preset[name]}
 
     @property
@@ -91,7 +125,9 @@ class Lane(param.Parameterized):
     def take(self, run: str, plan: Plan, results: Results, origin: Origin, label: str) -> None:
         """Show a run that was read from disk; its settings are those that it ended with."""
         ended = results.summaries[-1].tracking
-        self.param.update(tracker=ended.tracker, preset=plan.preset if plan.preset in PRESETS else "default")
+        self.param.update(tracker=ended.tracker, preset="default")
+        if plan.preset in self.presets.names(ended.tracker):
+            self.preset = plan.preset
         self.settings = ended.settings
         self.results, self.reopened, self.label = results, origin, label
         self.folder = Folder(run, (results.last or 0) + 1, owned=False)

@@ -58,6 +58,10 @@ class State(param.Parameterized):
     rules: int = param.Integer(0)
     shelf: int = param.Integer(0, doc="counts up when a run was kept, named or deleted")
 
+    preview: Any = param.Parameter(None, doc="app.preview.Preview of the frame shown, or nothing")
+    previewed: int = param.Integer(0, doc="counts up with every preview")
+    landscape_of: tuple[int, int] = param.ClassSelector(class_=tuple, default=(0, 1), doc="entries of the pose")
+
     playing: bool = param.Boolean(False)
     speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")
     loop: bool = param.Boolean(False, doc="whether play begins again at the end of what was tracked")
@@ -183,8 +187,14 @@ class State(param.Parameterized):
 
     @property
     def entry(self) -> Entry | None:
-        """Everything of the frame shown in the chosen lane, or None when it was not tracked or is no longer in memory."""
-        return self.lane.entry(self.frame)
+        """Everything of the frame shown in the chosen lane, weighed as its settings are now.
+
+        None when it was not tracked or is no longer in memory.
+        """
+        base = self.lane.entry(self.frame)
+        if self.preview is not None and self.preview.base is base and self.preview.settings == self.lane.settings:
+            return self.preview.entry  # type: ignore[no-any-return]
+        return base
 
     @property
     def summary(self) -> Summary | None:

@@ -26,7 +26,7 @@ class Follower(ABC):
 
     def __init__(self, state: State, mode: str | None = "one", also: tuple[str, ...] = ()) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
-        state.param.watch(self._follow, ["revision", "playing", *also])
+        state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
 
     def _follow(self, *_events: Any) -> None:
         if self._mode is not None and self.state.mode != self._mode:
