@@ -20,16 +20,16 @@ class Follower(ABC):
 
     Args:
         state: of the page.
-        mode: of the page that it is seen in.
+        mode: of the page that it is seen in; None for both.
         also: parameters of the state that it is drawn after, besides what was tracked.
     """
 
-    def __init__(self, state: State, mode: str = "one", also: tuple[str, ...] = ()) -> None:
+    def __init__(self, state: State, mode: str | None = "one", also: tuple[str, ...] = ()) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
-        state.param.watch(self._follow, ["revision", "playing", *also])
+        state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
 
     def _follow(self, *_events: Any) -> None:
-        if self.state.mode != self._mode:
+        if self._mode is not None and self.state.mode != self._mode:
             return
         now = time.monotonic()
         if self.state.playing and now - self._drawn < _EVERY:
