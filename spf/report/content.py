@@ -213,6 +213,6 @@ def repeat_commands(run: Run, directory: str) -> list[tuple[str, str]]:
     """Return (what for, command) that repeat a run; the first needs its directory, the second only the session."""
     commands = [("From its directory, bit for bit", f"spf track --repeat {shlex.quote(directory)} -o again")]
     made = [str(part) for part in run.manifest.get("command", [])]
-    if made:
+    if made and made[0] == "spf":  # the page makes runs too, and no command repeats what somebody clicked
         commands.append(("As it was made", shlex.join(made)))
     return commands

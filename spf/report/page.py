@@ -121,6 +121,11 @@ def _notices(run: Run, session: Session | None, cannot_draw: str) -> list[str]:
         notices.append(f"The run was stopped: {len(run.track)} of its {last - first} frames are here.")
     doubt = run.manifest["start"].get("doubt", "")
     notices += [doubt] if doubt else []
+    if run.plan.changes:
+        frames = ", ".join(str(change.frame) for change in run.plan.changes)
+        notices.append(
+            f"Tracker, settings or seed were changed on the way, from frame {frames} on; those shown are the first."
+        )
     notices += [NO_SESSION] if session is None else []
     if cannot_draw:
         notices.append(f"{cannot_draw} The key frames show the depth with the skeleton only.")
