@@ -50,7 +50,7 @@ class Depth:
         for lane in state.active:
             summary = lane.summary(state.frame)
             if summary is not None and not summary.lost:
-                colour = _ESTIMATE if self._mode == "one" else _rgb(lane.colour)
+                colour = _rgb(lane.colour) if self._mode == "compare" else _ESTIMATE
                 skeletons.append(Skeleton(summary.joints, colour))
         self.pane.image = depth_jpeg(frame, seen, skeletons)
 
