@@ -144,7 +144,7 @@ class State(param.Parameterized):
             lane.clear()
         start = origin.start
         doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
-        warning = " ".join(text for text in (doubt, available_network()[1]) if text)
+        warning = " ".join(text for text in (doubt, start.remark, available_network()[1]) if text)
         self.param.update(
             origin=origin, frame=start.frame, error="", warning=warning, revision=self.revision + 1
         )  # fmt: skip

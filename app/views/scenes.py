@@ -86,6 +86,6 @@ SCENES: dict[str, Callable[[Entry], Scene | None]] = {
 def view_of(entries: Iterable[Entry], azimuth: float, elevation: float, zoom: float) -> ViewCamera:
     """Return the sensor's view of the hand that explains the depth best, orbited by angles in radians and magnified."""
     best = min(entries, key=lambda entry: np.nan_to_num(entry.result.golden, nan=np.inf))
-    view = ViewCamera.from_sensor(best.result.joints)
+    view = ViewCamera.from_sensor(joints_of(best.tracking.hand, best.result.pose, best.result.reference))
     # The skin reaches beyond the joints, and the particles beyond the estimate.
     return view._replace(extent=1.25 * view.extent, azimuth=azimuth, elevation=elevation, zoom=zoom)
