@@ -161,11 +161,7 @@ def _depth_track(path: Path, file: Matroska, choice: Choice, uri: str) -> Track:
 
 def _lens(path: Path, file: Matroska, size: tuple[int, int], choice: Choice, uri: str) -> tuple[Lens, dict[str, str]]:
     if choice.camera is not None:
-        camera = choice.camera.camera(choice.camera.width or size[0], choice.camera.height or size[1])
-        if (camera.width, camera.height) != size:
-            raise SessionError(
-                f"The images of {uri} are {size[0]}×{size[1]}, but the camera given is {camera.width}×{camera.height}."
-            )
+        camera = choice.fitting(size, uri)
         return Lens(*camera[:6]), {"camera": "given by the user"}
     name = file.tags.get("K4A_CALIBRATION_FILE", "calibration.json")
     if name not in file.attachments or size not in _MODES:

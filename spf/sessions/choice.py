@@ -11,7 +11,7 @@ from spf.errors import SessionError
 from spf.frame import Camera
 from spf.sessions.camera_file import EXAMPLE, FolderCamera, read_camera_file
 
-__all__ = ["NOTHING", "Choice", "choice_of", "split_uri"]
+__all__ = ["Choice", "choice_of", "split_uri"]
 
 _MEANINGS = {
     "topic": "the topic, track or array with the depth",
@@ -41,8 +41,24 @@ class Choice(NamedTuple):
         """Metres per count that were chosen, in the URI or in the camera file."""
         return self.unit or (self.camera and self.camera.depth_unit)
 
+    def fitting(self, size: tuple[int, int], uri: str) -> Camera:
+        """Return the camera that was chosen, for images of a size.
 
-NOTHING = Choice()
+        Args:
+            size: (width, height) in pixels.
+            uri: for messages.
+
+        Raises:
+            SessionError: it is for images of another size.
+        """
+        assert self.camera is not None
+        given = (self.camera.width or size[0], self.camera.height or size[1])
+        if given != size:
+            raise SessionError(
+                f"The images of {uri} are {size[0]}×{size[1]}, but the camera given is {given[0]}×{given[1]}: give the "
+                "width, height and focal lengths of the images."
+            )
+        return self.camera.camera(*size)
 
 
 def split_uri(uri: str | Path) -> tuple[Path, dict[str, str]]:

@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 from spf.errors import SessionError
 from spf.frame import Camera
+from spf.sessions.arrays import is_arrays, open_arrays
+from spf.sessions.azure_mkv import is_azure_mkv, open_azure_mkv
+from spf.sessions.bop import is_bop, open_bop
 from spf.sessions.choice import choice_of, split_uri
 from spf.sessions.cvar import is_cvar, open_cvar
 from spf.sessions.files import natural_key
@@ -15,6 +18,7 @@ from spf.sessions.icvl import is_icvl, open_icvl
 from spf.sessions.mcap import is_mcap, open_mcap
 from spf.sessions.msra15 import is_msra15, open_msra15
 from spf.sessions.nyu import is_nyu, open_nyu
+from spf.sessions.open3d import is_open3d, open_open3d
 from spf.sessions.png_folder import is_png_folder, open_png_folder
 from spf.sessions.ros_bags import (
     is_realsense,
@@ -27,6 +31,7 @@ from spf.sessions.ros_bags import (
     open_ros_mcap,
 )
 from spf.sessions.session import Session
+from spf.sessions.tum import is_tum, open_tum
 
 __all__ = ["FORMATS", "Format", "open_session"]
 
@@ -58,10 +63,15 @@ FORMATS: tuple[Format, ...] = (
     Format("realsense", "a RealSense recording (.bag, .db3)", is_realsense, open_realsense, _OF_A_BAG),
     Format("ros1-bag", "a ROS 1 bag", is_ros1, open_ros1, _OF_A_BAG),
     Format("ros2-bag", "a ROS 2 bag (.db3, or its folder)", is_ros2, open_ros2, _OF_A_BAG),
+    Format("azure-mkv", "an Azure Kinect recording (.mkv)", is_azure_mkv, open_azure_mkv, ("topic", "camera", "unit")),
     Format("msra15", "an MSRA15 gesture folder (joint.txt, 000000_depth.bin, …)", is_msra15, open_msra15),
     Format("cvar", "a CVAR folder (joint.txt, 000000_depth.png, …)", is_cvar, open_cvar),
     Format("nyu", "an NYU folder (depth_1_0000001.png, …, joint_data.mat)", is_nyu, open_nyu),
     Format("icvl", "an ICVL folder (Depth/, labels.txt)", is_icvl, open_icvl),
+    Format("tum", "a TUM RGB-D folder (depth.txt, depth/)", is_tum, open_tum, ("camera", "unit")),
+    Format("bop", "a BOP scene (scene_camera.json, depth/)", is_bop, open_bop, ("camera", "unit")),
+    Format("open3d", "an Open3D folder (depth/, intrinsic.json)", is_open3d, open_open3d, ("camera", "unit")),
+    Format("arrays", "NumPy or HDF5 arrays (.npz, .npy, .h5)", is_arrays, open_arrays, ("topic", "camera", "unit")),
     Format(
         "png-folder",
         "a folder of 16-bit depth PNGs with camera.json",

@@ -42,17 +42,12 @@ def open_png_folder(path: Path, choice: Choice, uri: str) -> Session:
     check_png_sizes(paths)
     header = png_header(paths[0])
     given = choice.camera or folder_camera(path)
-    width, height = given.width or header.width, given.height or header.height
-    if (width, height) != (header.width, header.height):
-        raise SessionError(
-            f"The images in {path} are {header.width}×{header.height}, but the camera given is {width}×{height}: "
-            "give the width, height and focal lengths of the images."
-        )
+    camera = choice._replace(camera=given).fitting((header.width, header.height), uri)
     session = FileSession(
         uri=uri,
         name=path.resolve().name,
         format="png-folder",
-        camera=given.camera(width, height),
+        camera=camera,
         times_ns=steady_times(range(len(paths)), given.fps),
         depth_unit=choice.unit or given.depth_unit or _UNIT,
         side=given.side,

@@ -162,11 +162,7 @@ def _lens(
     assert depth.image.pixels is not None
     height, width = depth.image.pixels.shape
     if choice.camera is not None:
-        camera = choice.camera.camera(choice.camera.width or width, choice.camera.height or height)
-        if (camera.width, camera.height) != (width, height):
-            raise SessionError(
-                f"The images of {uri} are {width}×{height}, but the camera given is {camera.width}×{camera.height}."
-            )
+        camera = choice.fitting((width, height), uri)
         return Lens(*camera[:6]), {"camera": "given by the user"}
     topic = choice.camera_info or (stream and stream.camera_info) or _camera_topic(bag, depth, (width, height), uri)
     info = _camera_info(bag, topic, uri)

@@ -11,11 +11,12 @@ import pytest
 from spf.errors import SessionError
 from spf.frame import Camera
 from spf.sessions import FORMATS, Session, open_session, write_session
+from tests.sessions.file_makers import FILE_MAKERS
 from tests.sessions.makers import MAKERS as OWN_MAKERS
 from tests.sessions.makers import Made
 from tests.sessions.ros_makers import ROS_MAKERS
 
-MAKERS = {**OWN_MAKERS, **ROS_MAKERS}
+MAKERS = {**OWN_MAKERS, **ROS_MAKERS, **FILE_MAKERS}
 
 
 @pytest.fixture(params=sorted(MAKERS))
