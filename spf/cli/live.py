@@ -7,8 +7,9 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,24 +19,32 @@ from rich.status import Status
 
 from spf.cli.console import check_output, complain, warn
 from spf.cli.sessions import Force
-from spf.errors import SettingError
+from spf.errors import RunError, SettingError
+from spf.evaluate import count_losses
 from spf.live import SENSORS, Feed, FeedState, Recording, open_live
+from spf.live.keeping import LiveRun, latency_facts
+from spf.live.tracking import Request, find_live_start, follow
+from spf.runs import check_free
 from spf.sessions import Side
+from spf.trackers import make_settings
 
-__all__ = ["COMMANDS", "record"]
+__all__ = ["COMMANDS", "Seconds", "Wait", "record", "track_live"]
 
 LiveSensor = Annotated[
     str, typer.Argument(metavar="URI", help=f"A live sensor: {', '.join(s.example for s in SENSORS.values())}.")
 ]
 Wait = Annotated[bool, typer.Option("--wait", help="Wait for a sensor that is not there yet.")]
+Seconds = Annotated[float | None, typer.Option(min=0.1, help="Stop a live sensor after so long; else at Ctrl-C.")]
 _STATUS_EVERY = 0.5  # s
+_LATELY = 150  # tracked frames that the shown latency is of
 
 
 def record(
     uri: LiveSensor,
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.mcap", help="The file to record to.")],
-    seconds: Annotated[float | None, typer.Option(min=0.1, help="Stop after so long; else at Ctrl-C.")] = None,
+    seconds: Seconds = None,
     side: Annotated[str | None, typer.Option(metavar="left|right", help="Which hand is shown, if you know.")] = None,
+    run: Annotated[Path | None, typer.Option("--track", metavar="DIR", help="Track meanwhile, to this run.")] = None,
     wait: Wait = False,
     force: Force = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON twice a second.")] = False,
@@ -47,8 +56,14 @@ def record(
     Examples:
 
         spf record replay:sessions/open-close.mcap -o recording.mcap --seconds 3
+
+        spf record replay:sessions/open-close.mcap -o tracked.mcap --track runs/live
     """
     check_output(output, force)
+    if run is not None:
+        request = Request("spf", "default", make_settings("spf", "default", {}), side=checked_side(side))
+        track_live(uri, run, output, request, seconds=seconds, wait=wait, force=force, as_json=as_json)
+        return
     feed = Feed(open_live(uri), wait=wait)
     feed.record(output, side=checked_side(side), overwrite=force)
     with feed, stopped_by_signals(), status_line(as_json) as show:
@@ -61,6 +76,102 @@ def record(
         state = feed.state
     assert recording is not None
     summarise_recording(recording, state, as_json)
+    if not as_json:
+        print(f"Next: spf track {recording.path} -o RUN")
+
+
+def track_live(
+    uri: str,
+    directory: Path,
+    output: Path,
+    request: Request,
+    *,
+    seconds: float | None,
+    wait: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Track a live sensor while it is recorded, and keep both.
+
+    Raises:
+        RunError: no hand was found until it ended.
+    """
+    check_free(directory, force)
+    make_folder(output.parent)
+    feed = Feed(open_live(uri), wait=wait)
+    feed.record(output, side=request.side, overwrite=force)
+    until = float("inf") if seconds is None else time.monotonic() + seconds
+    kept: LiveRun | None = None
+
+    def stop() -> bool:
+        recording = feed.recording
+        return time.monotonic() > until or (recording is not None and recording.ended != "")
+
+    with feed, stopped_by_signals(), status_line(as_json) as show, ExitStack() as stack:
+        feed.recording_began()
+        take_notes(feed)
+        with suppress(KeyboardInterrupt):
+            start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
+            if start is not None:
+                warn(start.doubt)
+                command = ["spf", *sys.argv[1:]]
+                kept = LiveRun(directory, output, uri, request, start, command, overwrite=force)
+                stack.enter_context(kept)
+                _follow(feed, request, kept, stop, show)
+        recording, state = feed.stop_recording(), feed.state
+        if kept is not None:
+            kept.finish()
+    assert recording is not None
+    warn(recording.ended)
+    summarise_recording(recording, state, as_json)
+    if kept is None:
+        raise RunError(f"No hand was believed until the end, so nothing was tracked; {output} has all that was seen.")
+    if not as_json:
+        print(_summary(kept, directory))
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of a recording.
+
+    Raises:
+        RunError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunError(f"The directory {folder} cannot be made: {error.strerror}.") from None
+
+
+def _follow(feed: Feed, request: Request, kept: LiveRun, stop: Callable[[], bool], show: Any) -> None:
+    """Track and show how it goes until it is over."""
+    lately: deque[float] = deque(maxlen=_LATELY)
+    told, dropped, shown = "", 0, 0.0
+    for tracked in follow(feed, request, kept.start, stop):
+        kept.add(tracked)
+        lately.append(tracked.latency)
+        dropped += tracked.dropped
+        now, state, recording = time.monotonic(), feed.state, feed.recording
+        if now - shown > _STATUS_EVERY and recording is not None:
+            shown = now
+            doing = "lost, searching" if tracked.result.lost else "tracking"
+            show({"doing": doing, **latency_facts(list(lately)), "dropped": dropped, **facts(state, recording)})
+            sentence = recording.warning or state.message
+            if sentence != told:
+                told = sentence
+                warn(sentence)
+
+
+def _summary(kept: LiveRun, directory: Path) -> str:
+    track, live = kept.track, kept.facts()
+    if not len(track):
+        return f"A hand was found, but there was no frame left to track. Next: spf evaluate {directory}"
+    losses = count_losses(track.lost)
+    return (
+        f"Tracked {len(track)} of the frames live ({live['dropped']} dropped for newer ones): {losses.losses} losses, "
+        f"{losses.frames_lost} frames without a hand; from capture to estimate {live['latency_ms_median']} ms "
+        f"(median), {live['latency_ms_p95']} ms (95 %).\n"
+        f"Next: spf evaluate {directory}, or repeat it from the recording: spf track --repeat {directory} -o RUN"
+    )
 
 
 def _watch(feed: Feed, until: float, show: Any) -> None:
@@ -110,7 +221,7 @@ def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -
     missing = f" {state.missing} frames were lost between the sensor and this computer." if state.missing else ""
     print(
         f"Recorded {recording.frames} frames ({recording.seconds:.1f} s, {recording.size / 1e6:.1f} MB) to "
-        f"{recording.path}.{lost}{missing}\nNext: spf track {recording.path} -o RUN"
+        f"{recording.path}.{lost}{missing}"
     )
 
 

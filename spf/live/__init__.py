@@ -1,4 +1,7 @@
-"""Live depth sensors: opened by URI, recorded without loss, tracked with the newest frame winning (docs/live.md)."""
+"""Live depth sensors: opened by URI, recorded without loss (docs/live.md); ``spf.live.tracking`` tracks them.
+
+This package's own names need no tracker: a headless box that only records or sends imports nothing else.
+"""
 
 from spf.live.feed import Feed, FeedState, Taken
 from spf.live.opening import SENSORS, is_live, open_live

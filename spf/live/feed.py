@@ -39,9 +39,10 @@ class Taken(NamedTuple):
     recorded: int | None
 
     def frame(self) -> Frame:
-        """Return it in metres, as :meth:`spf.sessions.Session.__getitem__` would return it from the recording."""
+        """Return it in metres; if it is recorded, with the index that it has there, and the same depth bit by bit."""
         depth = self.capture.raw * np.float32(self.about.depth_unit)
-        return Frame(self.index, self.capture.time_ns / 1e9, depth, self.about.camera, self.capture.colour)
+        index = self.index if self.recorded is None else self.recorded
+        return Frame(index, self.capture.time_ns / 1e9, depth, self.about.camera, self.capture.colour)
 
 
 class FeedState(NamedTuple):
