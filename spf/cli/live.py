@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+import socket
 import sys
 import threading
 import time
@@ -23,12 +24,13 @@ from spf.errors import RunError, SettingError
 from spf.evaluate import count_losses
 from spf.live import SENSORS, Feed, FeedState, Recording, open_live
 from spf.live.keeping import LiveRun, latency_facts
+from spf.live.network import Publisher
 from spf.live.tracking import Request, find_live_start, follow
 from spf.runs import check_free
 from spf.sessions import Side
 from spf.trackers import make_settings
 
-__all__ = ["COMMANDS", "Seconds", "Wait", "record", "track_live"]
+__all__ = ["COMMANDS", "Seconds", "Wait", "record", "stream", "track_live"]
 
 LiveSensor = Annotated[
     str, typer.Argument(metavar="URI", help=f"A live sensor: {', '.join(s.example for s in SENSORS.values())}.")
@@ -78,6 +80,44 @@ def record(
     summarise_recording(recording, state, as_json)
     if not as_json:
         print(f"Next: spf track {recording.path} -o RUN")
+
+
+def stream(
+    uri: LiveSensor,
+    to: Annotated[str, typer.Option("--to", metavar="tcp://*:PORT", help="Where others connect to.")],
+    seconds: Seconds = None,
+    wait: Wait = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON twice a second.")] = False,
+) -> None:
+    """Send a live sensor to other computers: they record or track zmq://THIS-COMPUTER:PORT.
+
+    Example:  spf stream replay:sessions/open-close.mcap --to tcp://*:5555 --seconds 3
+    """
+    publisher = Publisher(to)
+    try:
+        with (
+            Feed(open_live(uri), wait=wait, send=publisher.send) as feed,
+            stopped_by_signals(),
+            status_line(as_json) as show,
+            suppress(KeyboardInterrupt),
+        ):
+            sensor = feed.about().sensor
+            port = publisher.address.rpartition(":")[2]
+            complain(
+                f"{sensor} is sent from {publisher.address}; there: spf track zmq://{socket.gethostname()}:{port} -o RUN"
+            )
+            until = float("inf") if seconds is None else time.monotonic() + seconds
+            told = ""
+            while time.monotonic() < until and not feed.state.ended:
+                show(facts(feed.state, None))
+                if feed.state.message != told:
+                    told = feed.state.message
+                    warn(told)
+                time.sleep(min(_STATUS_EVERY, max(until - time.monotonic(), 0.0)))
+    finally:
+        publisher.close()
+    if not as_json:
+        print(f"Sent {feed.state.taken} frames of {sensor}.")
 
 
 def track_live(
@@ -283,4 +323,4 @@ def take_notes(feed: Feed) -> None:
     threading.Thread(target=read, name="notes", daemon=True).start()
 
 
-COMMANDS = (record,)
+COMMANDS = (record, stream)

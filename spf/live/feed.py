@@ -78,9 +78,18 @@ class Feed:
         source: the sensor.
         wait: whether a sensor that is not there at first is waited for; else that ends the feed, with its message.
         retry: seconds between two attempts to connect.
+        send: called with every capture, by the sensor's thread.
     """
 
-    def __init__(self, source: LiveSource, *, wait: bool = False, retry: float = _RETRY) -> None:
+    def __init__(
+        self,
+        source: LiveSource,
+        *,
+        wait: bool = False,
+        retry: float = _RETRY,
+        send: Callable[[About, Capture], None] | None = None,
+    ) -> None:
+        self._send = send
         self._source, self._wait, self._retry = source, wait, retry
         self._changed = threading.Condition()
         self._stop = threading.Event()
@@ -262,6 +271,8 @@ class Feed:
         gap = 0 if self._number is None else max(capture.number - self._number - 1, 0)
         self._number = capture.number
         capture = capture._replace(time_ns=time_ns)
+        if self._send is not None:
+            self._send(about, capture)
         self._arrivals.append(time.monotonic())
         with self._changed:
             if self._record is not None:

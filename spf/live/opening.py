@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from spf.errors import SensorError
+from spf.live.network import NetworkSource
+from spf.live.oak import Oak
+from spf.live.realsense import RealSense
 from spf.live.replay import Replay
 from spf.live.source import LiveSource
 from spf.live.uri import LiveUri, parse_live_uri
@@ -28,6 +31,9 @@ class Sensor(NamedTuple):
 
 #: A new sensor is one file and one row.
 SENSORS: dict[str, Sensor] = {
+    "realsense": Sensor("realsense:[?serial=…&size=640x480&rate=30]", RealSense),
+    "oak": Sensor("oak:[?serial=…&size=640x400&rate=30]", Oak),
+    "zmq": Sensor("zmq://HOST:PORT", NetworkSource),
     "replay": Sensor("replay:SESSION[?speed=1&loop=0]", Replay),
 }
 
