@@ -77,6 +77,7 @@ def _facts(session: Session) -> dict[str, Any]:
         "truth": session.joint_definition if session.has_truth else None,
         "exact_hand_shape": session.hand_shape is not None,
         "sensor": session.metadata.get("sensor"),
+        "notes": [f"{note.time:.1f} s {note.kind}: {note.text}" for note in session.notes],
         "warnings": list(session.warnings),
     }
 
@@ -120,6 +121,9 @@ def _write(session: Session, output: Path, first: int, last: int) -> None:
     )
     try:
         with writer, progress_bar() as report:
+            for note in session.notes:
+                if session.times[first] <= note.time <= session.times[last - 1]:
+                    writer.add_note(note)
             for done, index in enumerate(range(first, last), 1):
                 writer.write(session[index])
                 report(f"Writing {output.name}", done / (last - first))

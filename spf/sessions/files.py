@@ -169,5 +169,6 @@ def check_depth_unit(session: Session) -> None:
     if not low <= median <= high:
         raise SessionError(
             f"{session.uri} has depth in the wrong unit: with {session.depth_unit:g} m a count its median depth is "
-            f"{median:.3g} m, and {low:g} to {high:g} m is believable; set depth_unit, or unit= behind the ?, to the metres of one count."
+            f"{median:.3g} m, and {low:g} to {high:g} m is believable; set depth_unit, or unit= behind the ?, "
+            "to the metres of one count."
         )
