@@ -36,7 +36,7 @@ _LOOK = 0.5  # s between two looks at the server's kernels
 
 def page() -> pmu.Page:
     """Build the page of one visitor."""
-    pn.extension()
+    pn.extension("tabulator")
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
     controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait)

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from typing import Any
 
 import panel as pn
-from bokeh.models import Span
+from bokeh.models import CategoricalTicker, Span
 from bokeh.plotting import figure
 
 from app.state import State
@@ -39,7 +39,8 @@ def calm_figure(x_label: str, y_label: str, **options: Any) -> figure:
         axis.major_label_text_font_size, axis.axis_label_standoff = "10px", 4
         axis.axis_line_color, axis.minor_tick_line_color, axis.major_tick_line_color = "#9aa4ae", None, "#9aa4ae"
     plot.grid.grid_line_color = "#e6eaee"
-    plot.yaxis.ticker.desired_num_ticks = 4
+    if not isinstance(plot.yaxis[0].ticker, CategoricalTicker):
+        plot.yaxis.ticker.desired_num_ticks = 4
     return plot
 
 
@@ -58,8 +59,11 @@ def heading(title: str, *keys: tuple[str, str, str]) -> str:
 class Plot(Follower):
     """A pane that follows the state, under a heading."""
 
-    def __init__(self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = ()) -> None:
-        super().__init__(state, mode, also)
+    def __init__(
+        self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = (),
+        look: tuple[str, ...] = (),
+    ) -> None:  # fmt: skip
+        super().__init__(state, mode, also, look)
         self.figure = plot
         self.heading = pn.pane.HTML(title, margin=(2, 4), sizing_mode="stretch_width")
         self.pane = pn.pane.Bokeh(plot, sizing_mode="stretch_both", margin=0)
