@@ -20,7 +20,7 @@ LAYERS = {
 }  # fmt: skip
 
 #: What the colours of particles say, by the words of the page.
-COLOURINGS = {"before / after": "stage", "weight": "weight", "cost E": "cost", "distance to the points": "distance"}
+COLOURINGS = {"before / after": "stage", "weight": "weight", "cost E": "cost", "distance": "distance"}
 
 #: Kernel density estimates (27), (28), (31), by the words of the page.
 DENSITIES = {"f": "f", "f⁺": "f_plus", "g": "g"}

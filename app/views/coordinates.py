@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _GRID = 72  # points along each axis at which the densities are evaluated
 _LEVELS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of each density's peak in the plane
 _COLOURS, _DASHES = {"f": BEFORE, "f_plus": AFTER, "g": CALM}, {"f": "solid", "f_plus": "solid", "g": "4 3"}
-_LEAST_SPAN = {True: 4.0, False: 4.0}  # mm and degrees that an axis shows at least
+_LEAST_SPAN = 4.0  # mm or degrees that an axis shows at least
 
 
 class Coordinates(Plot):
@@ -39,6 +39,7 @@ class Coordinates(Plot):
     def __init__(self, state: State, particles: Particles) -> None:
         look = state.look
         plot = calm_figure(axis_label(look.across), axis_label(look.upwards), x_range=(-1, 1), y_range=(-1, 1))
+        plot.xaxis.ticker.desired_num_ticks = plot.yaxis.ticker.desired_num_ticks = 8
         self.contours = {name: ColumnDataSource({"xs": [], "ys": [], "alpha": []}) for name in _COLOURS}
         self.paths = ColumnDataSource({"xs": [], "ys": [], "alpha": [], "width": []})
         self.window = ColumnDataSource({"x": [], "y": [], "width": [], "height": []})
@@ -166,7 +167,7 @@ def _relative(truth: Truth, reference: Array) -> Array | None:
 def _ranges(points: Array, bandwidth: Array) -> tuple[Array, Array]:
     """Ends of both axes: all particles, and one window around them where densities are drawn."""
     low, high = points.min(axis=0), points.max(axis=0)
-    span = np.maximum(high - low, 4.0)  # mm or degrees
+    span = np.maximum(high - low, _LEAST_SPAN)
     middle, half = 0.5 * (low + high), 0.5 * span * 1.25
     half = np.maximum(half, 0.5 * (high - low) + 1.35 * bandwidth)
     return middle - half, middle + half
@@ -192,6 +193,7 @@ def _tools(state: State) -> pmu.Row:
     options: dict[str, Any] = {"options": ENTRIES, "size": "small", "margin": (2, 4), "sizing_mode": "stretch_width"}
     densities = pmu.CheckButtonGroup.from_param(
         look.param.densities, name="", options=DENSITIES, size="small", margin=(6, 4), width=130,
+        sx={"& .MuiToggleButton-root": {"textTransform": "none"}},
     )  # fmt: skip
     return pmu.Row(
         pmu.Select.from_param(look.param.across, label="Across", **options),

@@ -12,7 +12,8 @@ from app.state import State
 
 __all__ = ["Follower"]
 
-_EVERY = 0.4  # s between two redraws while playing
+_EVERY = 0.6  # s between two redraws while playing
+_PICTURES_FIRST = 80  # ms that the plots leave to the pictures, which are looked at first
 
 
 class Follower(ABC):
@@ -44,7 +45,7 @@ class Follower(ABC):
         if document is None or document.session_context is None:
             self.draw()
         else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
-            document.add_next_tick_callback(self.draw)
+            document.add_timeout_callback(self.draw, _PICTURES_FIRST)
 
     @abstractmethod
     def draw(self) -> None:

@@ -22,6 +22,12 @@ _COLUMNS: dict[str, tuple[str, int | None, int]] = {
     "log_c_before": ("log₁₀ c before", 2, 116), "log_c_after": ("log₁₀ c after", 2, 108),
     "weight_before": ("weight before, %", 1, 128), "weight_after": ("weight after, %", 1, 120),
 }  # fmt: skip
+_SMALL = """
+.tabulator, .tabulator .tabulator-row .tabulator-cell { font: 12px Roboto, sans-serif !important; }
+.tabulator .tabulator-header .tabulator-col .tabulator-col-content { padding: 4px 6px !important; font-size: 12px; }
+.tabulator .tabulator-row .tabulator-cell { padding: 4px 8px !important; height: auto !important; }
+.tabulator .tabulator-row { min-height: 24px !important; }
+"""
 
 
 class ParticleTable(Follower):
@@ -34,7 +40,7 @@ class ParticleTable(Follower):
         self._particles = particles
         self.pane = pn.widgets.Tabulator(
             _frame(particles), show_index=False, disabled=True, selectable=True, layout="fit_data_stretch",
-            theme="simple", sizing_mode="stretch_both", margin=0,
+            theme="simple", stylesheets=[_SMALL], sizing_mode="stretch_both", margin=0,
             widths={heading: width for heading, _, width in _COLUMNS.values()},
             formatters={
                 heading: {"type": "money", "precision": decimals, "thousand": False, "symbol": ""}

@@ -23,8 +23,10 @@ def css(colour: tuple[float, float, float]) -> str:
     return "#" + "".join(f"{round(255 * part):02x}" for part in colour)
 
 
+_INK = "var(--panel-on-background-color, #2a3038)"  # the page's own, whether it is light or dark
+
 #: Before and after optimisation, as in the renders; a calm third one; loss.
-BEFORE, AFTER, CALM, LOSS = css(PREDICTED), css(OPTIMISED), "#44505c", css(RESIDUAL)
+BEFORE, AFTER, CALM, LOSS = css(PREDICTED), css(OPTIMISED), "#76828e", css(RESIDUAL)
 
 
 def calm_figure(x_label: str, y_label: str, **options: Any) -> figure:
@@ -51,8 +53,8 @@ def heading(title: str, *keys: tuple[str, str, str]) -> str:
         for sign, colour, meaning in keys
     )
     return (
-        "<div style='font:500 13px/24px Roboto,sans-serif;color:#2a3038;white-space:nowrap'>"
-        f"{title}<span style='font-weight:400;font-size:12px;color:#44505c'>{legend}</span></div>"
+        f"<div style='font:500 13px/24px Roboto,sans-serif;color:{_INK};white-space:nowrap'>"
+        f"{title}<span style='font-weight:400;font-size:12px;opacity:0.85'>{legend}</span></div>"
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource, HoverTool, LinearAxis, Range1d
 
 from app.state import State
-from app.views.plots import AFTER, CALM, FramePlot, calm_figure, heading
+from app.views.plots import AFTER, FramePlot, calm_figure, heading
 
 __all__ = ["SamplesOverFrames"]
 
@@ -57,4 +57,3 @@ class SamplesOverFrames(FramePlot):
         self.resampled.data = {"frame": resampled, "zero": [2] * len(resampled)}
         known = [s.ess for s in summaries if np.isfinite(s.ess)]
         self.figure.y_range.update(start=0, end=max(2.0, 1.1 * max(known, default=0.0)))
-        self.figure.yaxis[0].axis_label_text_color = CALM

@@ -68,10 +68,10 @@ def scene_card(state: State, renderer: Renderer, tab: str, height: int) -> tuple
     key.draw()
     layers = pmu.CheckButtonGroup.from_param(
         look.param.layers, name="", options=LAYERS, size="small", margin=(4, 4),
-        sx={"& .MuiToggleButton-root": {"textTransform": "none", "padding": "2px 8px"}},
+        sx={"& .MuiToggleButton-root": {"textTransform": "none", "padding": "2px 6px"}},
     )  # fmt: skip
     colouring = pmu.Select.from_param(
-        look.param.colouring, label="Colour by", options=COLOURINGS, size="small", margin=(4, 4), width=170
+        look.param.colouring, label="Colour by", options=COLOURINGS, size="small", margin=(4, 4), width=150
     )
     content = pn.Column(
         pn.FlexBox(layers, colouring, sizing_mode="stretch_width", margin=0), pictures.panes["scene"],

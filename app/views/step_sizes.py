@@ -13,7 +13,7 @@ from bokeh.models import (
     HoverTool,
     LinearColorMapper,
 )
-from bokeh.palettes import PuOr11
+from bokeh.palettes import PuOr11, interp_palette
 
 from app.state import State
 from app.views.entries import short_name
@@ -35,12 +35,14 @@ class StepSizes(Plot):
     def __init__(self, state: State) -> None:
         self.source = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []})
         plot = calm_figure("iteration", "", x_range=(0, 80), y_range=FactorRange(*reversed(_NAMES)))
-        colours = LinearColorMapper(palette=PuOr11, low=-_DECADES, high=_DECADES, nan_color="rgba(128, 128, 128, 0.25)")
+        colours = LinearColorMapper(
+            palette=interp_palette(PuOr11, 255), low=-_DECADES, high=_DECADES, nan_color="rgba(128, 128, 128, 0.25)"
+        )
         picture = plot.image("image", "x", "y", "dw", "dh", source=self.source, color_mapper=colours)
         plot.add_layout(
             ColorBar(
                 color_mapper=colours, ticker=FixedTicker(ticks=list(_TICKS)), major_label_overrides=_TICKS, width=10,
-                title="a/a₀", padding=4, label_standoff=4,
+                padding=4, label_standoff=4,
             ),
             "right",
         )  # fmt: skip
@@ -70,7 +72,7 @@ class StepSizes(Plot):
         self.source.data = {"image": [relative.T[::-1]], "x": [0], "y": [0], "dw": [count], "dh": [len(_NAMES)]}
         self.figure.x_range.update(start=0, end=count)
         which = "picked" if picked else "the heaviest"
-        self.heading.object = heading(f"Step sizes of particle {particle + 1}", ("", CALM, which))
+        self.heading.object = heading(f"Step sizes a/a₀ of particle {particle + 1}", ("", CALM, which))
 
     def _show_nothing(self, why: str) -> None:
         self.source.data = {name: [] for name in self.source.data}

@@ -19,7 +19,7 @@ from spf.render import Renderer
 
 __all__ = ["Thinking"]
 
-_PLANE_HEIGHT, _TABLE_HEIGHT, _DESCENT_HEIGHT, _FRAMES_HEIGHT = 440, 250, 440, 200
+_PLANE_HEIGHT, _TABLE_HEIGHT, _DESCENT_HEIGHT, _FRAMES_HEIGHT = 440, 216, 440, 200
 
 
 class Thinking:
@@ -36,7 +36,7 @@ class Thinking:
             card(pn.Column(plane.tools, plane.pane, sizing_mode="stretch_both", margin=0), plane.heading, _PLANE_HEIGHT,
                  least_width=420),
             scene,
-            card(table.pane, words, _TABLE_HEIGHT, least_width=640),
+            card(table.pane, words, _TABLE_HEIGHT, least_width=900),
             card(descents.pane, descents.heading, _DESCENT_HEIGHT, least_width=420),
             card(steps.pane, steps.heading, _DESCENT_HEIGHT, least_width=420),
             card(samples.pane, samples.heading, _FRAMES_HEIGHT, least_width=420),

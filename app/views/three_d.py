@@ -69,32 +69,41 @@ class ThreeD:
         self._view: ViewCamera | None = None  # of the last picture
         self._drawing: asyncio.Task[None] | None = None
         self._awaited = 0  # pictures sent to the browser that it has not shown yet
+        self._asked = self._sent = self._seen = self._before = 0  # requests so far: made, sent, seen, at the last wait
         self._all_shown = asyncio.Event()
         state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
         state.look.param.watch(self.request, ["tab", "layers", "colouring", "selected", "pan", "anchor"])
 
-    def request(self, *_events: Any) -> None:
-        """Have the present state drawn soon."""
+    def request(self, *events: Any) -> None:
+        """Have the present state drawn soon; a new frame quickly first, and sharp when it has settled."""
+        if any(event.name == "revision" for event in events):
+            self._moved = time.monotonic()
         state = self._state
         if state.mode != self._mode or (self._mode == "one" and state.look.tab != self._tab):
             return
         self._wanted = True
+        self._asked += 1
         if self._drawing is None or self._drawing.done():
             self._drawing = asyncio.get_running_loop().create_task(self._draw_until_settled())
 
     async def drawn(self) -> None:
-        """Wait until the browser shows what was last requested; at most a second."""
-        if self._drawing is not None:
-            await self._drawing
-        if self._awaited:
+        """Wait until the browser shows what was requested before the last wait; at most a second.
+
+        So one frame is drawn while the next one is tracked, and never two.
+        """
+        goal, self._before = self._before, self._asked
+        deadline = time.monotonic() + _PATIENCE
+        while self._seen < goal:
+            self._all_shown.clear()
             try:
-                await asyncio.wait_for(self._all_shown.wait(), _PATIENCE)
+                await asyncio.wait_for(self._all_shown.wait(), deadline - time.monotonic())
             except TimeoutError:
-                self._awaited = 0  # nobody is looking: go on without
+                self._awaited, self._seen = 0, self._asked  # nobody is looking: go on without
 
     def _on_shown(self) -> None:
         self._awaited = max(self._awaited - 1, 0)
         if not self._awaited:
+            self._seen = max(self._seen, self._sent)
             self._all_shown.set()
 
     def _on_orbit(self, right: float, up: float, magnify: float) -> None:
@@ -130,13 +139,14 @@ class ThreeD:
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
 
     async def _draw(self, *, sharp: bool) -> None:
-        state, lanes = self._state, self._lanes()
+        state, lanes, asked = self._state, self._lanes(), self._asked
         entries = {name: entry for name, lane in lanes.items() if (entry := lane.entry(state.frame)) is not None}
         scenes = await self._scenes(entries)
         for name, lane in lanes.items():
             if name not in scenes:
                 self.panes[name].param.update(image=b"", hint=self._hint(lane))
         if not scenes:
+            self._seen = asked
             return
         view = self._view = view_of((entries[name] for name in scenes), state)
         size, quality = (self._sizes[1], 92) if sharp else (self._sizes[0], 80)
@@ -147,8 +157,7 @@ class ThreeD:
             for name, scene in scenes.items()
         }
         pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
-        self._all_shown.clear()
-        self._awaited = len(pictures)
+        self._awaited, self._sent = len(pictures), asked
         with pn.io.hold():
             for name, picture in pictures.items():
                 self.panes[name].image = picture

@@ -52,12 +52,13 @@ def viewpoints(state: State) -> pmu.Row:
                 state.look.pan = (0.0, 0.0)
 
         return pmu.Button(
-            label=name, description=words, variant="text", size="small", margin=(0, 2), on_click=look,
-            sx={"minWidth": "0", "textTransform": "none"},
+            label=name, description=_in_one_line(f"{name}: {words}"), variant="text", color="default", size="small",
+            margin=(0, 2), on_click=look, sx={"minWidth": "0", "textTransform": "none"},
         )  # fmt: skip
 
     follow = pmu.Switch(
         label="Follow", value=state.look.anchor is None, size="small", margin=(0, 6), align="center",
+        sx={"& .MuiFormControlLabel-label": {"fontSize": "13px"}},
     )  # fmt: skip
 
     def toggle(event: Any) -> None:
@@ -65,4 +66,31 @@ def viewpoints(state: State) -> pmu.Row:
         state.look.anchor = None if event.new or entry is None else hand_view(entry)
 
     follow.param.watch(toggle, "value")
-    return pmu.Row(*(button(name) for name in VIEWS), follow, margin=0, align="center")
+    return pmu.Row(_picked(state), *(button(name) for name in VIEWS), follow, margin=0, align="center")
+
+
+def _in_one_line(text: str) -> str:
+    """A description that is not broken into lines as narrow as the button."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def _picked(state: State) -> pmu.Button:
+    """Return a button that says how many particles are picked, and shows all again."""
+    look = state.look
+    every = pmu.Button(
+        label="",
+        icon="close",
+        variant="outlined",
+        size="small",
+        margin=(0, 8),
+        visible=False,
+        sx={"textTransform": "none"},
+    )
+
+    def count(_event: Any) -> None:
+        some = len(look.selected)
+        every.param.update(label=f"{some} particle{'s' * (some != 1)} picked: show all", visible=some > 0)
+
+    every.on_click(lambda _event: look.param.update(selected=()))
+    look.param.watch(count, "selected")
+    return every
