@@ -36,7 +36,7 @@ _LOOK = 0.5  # s between two looks at the server's kernels
 
 def page() -> pmu.Page:
     """Build the page of one visitor."""
-    pn.extension()
+    pn.extension("tabulator")
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
     controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait)
@@ -66,7 +66,7 @@ def page() -> pmu.Page:
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
         title=_TITLE, header=[modes.switch(controller.show_mode), Status(state, controller.cancel).panel],
-        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=False,
+        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip
     with param.edit_constant(built):

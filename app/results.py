@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,6 @@ from spf.track import TrackedFrame, Tracking, TrackState
 
 __all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules"]
 
-PATH_POSES = 26  # poses kept of a trajectory of SMD: enough to draw it
 MEMORY = 128 * 2**20  # bytes of entries that one lane of a page keeps
 
 
@@ -58,6 +58,9 @@ class Summary(NamedTuple):
         lost: whether the hand is lost.
         recovered: whether it was found again in this frame.
         ess: effective sample size, nan while lost.
+        optimised_share: weight of the optimised samples, nan while lost.
+        resampled: whether the particles were resampled.
+        winner: proposal of the heaviest particle; "" while lost.
         golden, overlap: how well the render explains the depth, nan while lost.
         error: mean distance of the joints from the truth, m; nan where there is no truth.
         seconds: spent on the frame.
@@ -69,6 +72,9 @@ class Summary(NamedTuple):
     lost: bool
     recovered: bool
     ess: float
+    optimised_share: float
+    resampled: bool
+    winner: str
     golden: float
     overlap: float
     error: float
@@ -90,11 +96,13 @@ class Results:
         index = entry.result.index
         for later in [i for i in self._summaries if i >= index]:
             self._drop(later)
-        result = entry.result
+        result, info = entry.result, entry.result.info
         self._entries[index] = entry
         self._sizes[index] = _bytes(entry)
         self._summaries[index] = Summary(
-            index, result.joints, result.lost, result.recovered, result.ess, result.golden, result.overlap,
+            index, result.joints, result.lost, result.recovered, result.ess,
+            math.nan if info is None else info.optimised_share, info is not None and info.resampled,
+            "" if info is None else info.winner, result.golden, result.overlap,
             joint_error(result.joints, frame), result.seconds, entry.tracking,
         )  # fmt: skip
         while sum(self._sizes.values()) > self._memory and len(self._entries) > 1:
@@ -143,10 +151,10 @@ def joint_error(joints: NDArray[np.float64], frame: Frame) -> float:
 
 
 def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking) -> Entry:
-    """Return what is kept of a frame: trajectories of at most PATH_POSES poses each, and what views show of the depth."""
+    """Return what is kept of a frame: trajectories in single precision, and what views show of the depth."""
     info, observation = result.info, result.observation
     if info is not None:
-        info = info._replace(trajectories=tuple(_thin(trace) for trace in info.trajectories))
+        info = info._replace(trajectories=tuple(_light(trace) for trace in info.trajectories))
     seen = None
     if observation is not None:
         points = observation.hand_points.astype(np.float32)
@@ -154,10 +162,8 @@ def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking) -> Ent
     return Entry(result._replace(info=info, observation=None), state, tracking, seen)
 
 
-def _thin(trace: Trajectory) -> Trajectory:
-    count = len(trace.poses)
-    kept = np.unique(np.linspace(0, count - 1, min(count, PATH_POSES)).round().astype(np.intp))
-    return Trajectory(*(part[kept] for part in trace))
+def _light(trace: Trajectory) -> Trajectory:
+    return Trajectory(*(part.astype(np.float32) for part in trace))
 
 
 def same_rules(tracking: Tracking, tracker: str, settings: Settings) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 import param
 
 from app.lane import Lane, Origin
+from app.look import Look
 from app.results import Entry, Summary
 from spf.errors import SettingError
 from spf.initialise import Doubted
@@ -71,6 +72,7 @@ class State(param.Parameterized):
     def __init__(self, **params: Any) -> None:
         first = Lane(colour=COLOURS[0])
         super().__init__(lanes=(first,), lane=first, **params)
+        self.look = Look()
         self._watch_lane(first)
 
     # ---- lanes
@@ -207,3 +209,4 @@ class State(param.Parameterized):
     def reset_view(self) -> None:
         """Look from where the sensor is."""
         self.param.update(azimuth=0.0, elevation=0.0, zoom=1.0)
+        self.look.pan = (0.0, 0.0)
