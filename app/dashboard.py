@@ -9,14 +9,24 @@ import panel as pn
 import panel_material_ui as pmu
 import param
 
+from app.address import Address, follow_in, place_of
 from app.controller import Controller
+from app.keeper import Keeper
+from app.presets import Presets
+from app.preview import Previewer
+from app.reruns import Reruns
 from app.runner import Runner
 from app.server import bundled, kernels, open_shared, renderer
+from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
+from app.views.again_card import AgainCard
+from app.views.fold import folded
+from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
 from app.views.messages import Messages
 from app.views.modes import Modes
+from app.views.runs_card import RunsCard
 from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
 from app.views.start_card import StartCard
@@ -39,20 +49,28 @@ def page() -> pmu.Page:
     pn.extension("tabulator")
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
-    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait)
+    shelf, presets = Shelf(), Presets()
+    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf))
+    reruns, previewer = Reruns(controller, shelf), Previewer(state)
+    address = Address(state, controller, reruns, samples)
     session = SessionCard(state, controller.open, samples, uploads)
-    lanes, settings = LanesCard(state, controller), SettingsCard(state)
+    lanes, settings = LanesCard(state, controller), SettingsCard(state, presets)
+    again, landscape = AgainCard(state, reruns), LandscapeCard(state)
+    runs = folded("Runs", lambda: [RunsCard(state, shelf, reruns).panel])
     start = StartCard(state, controller.start)
     main = [Transport(state, controller).panel, Messages(state).panel, modes.panel]
     line = {"margin": (2, 10)}
     sidebar = [
         session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
+        landscape.panel, again.panel, pmu.Divider(**line), runs,
     ]  # fmt: skip
 
     async def first() -> None:
         modes.pictures.request()
-        if samples:
-            await controller.open(next(iter(samples.values())))
+        location = pn.state.location
+        await address.go(place_of({} if location is None else location.query_params))
+        if location is not None:
+            follow_in(location, state, address)
         while progress := kernels().progress:
             state.preparing = progress
             await asyncio.sleep(_LOOK)
@@ -60,6 +78,7 @@ def page() -> pmu.Page:
 
     def gone(_context: Any) -> None:
         controller.close()
+        previewer.close()
         uploads.close()
 
     pn.state.onload(first)
@@ -69,6 +88,7 @@ def page() -> pmu.Page:
         main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip
+    built.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     with param.edit_constant(built):
         built.busy = False  # it follows every message otherwise, and the browser lays the whole page out anew each time
     return built

@@ -16,7 +16,7 @@ from spf.errors import RunError
 from spf.frame import JOINT_NAMES
 from spf.track import TrackedFrame
 
-__all__ = ["Track", "TrackRow", "read_track", "row_of", "track_of", "write_track"]
+__all__ = ["Track", "TrackRow", "read_track", "row_of", "rows_of", "track_of", "write_track"]
 
 Array = NDArray[np.float64]
 
@@ -117,6 +117,24 @@ def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
         dof_names=dof_names,
         timings={stage: numbers([result.timings.get(stage, nan) for result in results]) for stage in stages},
     )
+
+
+def rows_of(track: Track) -> list[TrackRow]:
+    """Return the frames of a track: the inverse of :func:`track_of`."""
+    rows = []
+    for i in range(len(track)):
+        timings = {stage: float(values[i]) for stage, values in track.timings.items() if np.isfinite(values[i])}
+        likelihood, ess, golden, overlap, seconds = (
+            float(getattr(track, name)[i]) for name in ("log_likelihood", "ess", "golden", "overlap", "seconds")
+        )
+        result = TrackedFrame(
+            int(track.frame[i]), float(track.time[i]), track.poses[i], track.references[i], track.joints[i],
+            bool(track.lost[i]), bool(track.recovered[i]), likelihood, ess, golden, overlap, seconds, timings, None, None,
+        )  # fmt: skip
+        rows.append(
+            TrackRow(result, float(track.optimised_share[i]), float(track.evaluations[i]), str(track.winner[i]))
+        )
+    return rows
 
 
 def write_track(track: Track, path: Path) -> None:

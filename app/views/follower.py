@@ -21,7 +21,7 @@ class Follower(ABC):
 
     Args:
         state: of the page.
-        mode: of the page that it is seen in.
+        mode: of the page that it is seen in; None for both.
         also: parameters of the state that it is drawn after, besides what was tracked.
         look: parameters of the look that it is drawn after, besides the tab.
     """
@@ -29,13 +29,16 @@ class Follower(ABC):
     #: Tab of the page of one tracker that it is seen in.
     tab: ClassVar[str] = "overview"
 
-    def __init__(self, state: State, mode: str = "one", also: tuple[str, ...] = (), look: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, state: State, mode: str | None = "one", also: tuple[str, ...] = (), look: tuple[str, ...] = ()
+    ) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
-        state.param.watch(self._follow, ["revision", "playing", *also])
+        state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
         state.look.param.watch(self._follow, ["tab", *look])
 
     def _follow(self, *_events: Any) -> None:
-        if self.state.mode != self._mode or (self._mode == "one" and self.state.look.tab != self.tab):
+        hidden = self._mode == "one" and self.state.look.tab != self.tab
+        if self._mode is not None and (self.state.mode != self._mode or hidden):
             return
         now = time.monotonic()
         if self.state.playing and now - self._drawn < _EVERY:
