@@ -21,6 +21,7 @@ from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
 from app.views.again_card import AgainCard
+from app.views.export_card import ExportCard
 from app.views.fold import folded
 from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
@@ -67,12 +68,13 @@ def page() -> pmu.Page:
     lanes, settings = LanesCard(state, controller), SettingsCard(state, presets)
     again, landscape = AgainCard(state, reruns), LandscapeCard(state)
     runs = folded("Runs", lambda: [RunsCard(state, shelf, reruns).panel])
+    export = folded("Export", lambda: [ExportCard(state, controller, renderer(), shelf.folder).panel])
     start = StartCard(state, controller.start)
     main = [Transport(state, controller).panel, Messages(state).panel, modes.panel]
     line = {"margin": (2, 10)}
     sidebar = [
         session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
-        landscape.panel, again.panel, pmu.Divider(**line), runs,
+        landscape.panel, again.panel, pmu.Divider(**line), runs, export,
     ]  # fmt: skip
 
     async def first() -> None:
