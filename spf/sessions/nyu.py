@@ -86,7 +86,8 @@ def _read_joints(path: Path, numbers: list[int]) -> tuple[NDArray[np.float64] | 
         raise SessionError(f"The file {path} is damaged or holds no joint_xyz: copy it again.") from error
     if xyz_mm.ndim != 3 or xyz_mm.shape[1:] != (_MARK_COUNT, 3):
         raise SessionError(f"The file {path} holds no joint_xyz of 36 joints a frame: copy it again.")
-    xyz = xyz_mm * np.array([1e-3, -1e-3, 1e-3])  # y points up there
+    with np.errstate(invalid="ignore"):  # a damaged number stays none
+        xyz = xyz_mm * np.array([1e-3, -1e-3, 1e-3])  # y points up there
     listed = arrange_joints(xyz, _names())
     listed[:, JOINT_NAMES.index("wrist")] = (xyz[:, _PALM_1] + xyz[:, _PALM_2]) / 2
     joints = np.full((len(numbers), len(JOINT_NAMES), 3), np.nan)
