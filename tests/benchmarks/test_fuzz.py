@@ -35,7 +35,8 @@ def test_damaged_recordings_are_refused_or_read(name, tmp_path):
 
 # What the thousands found: an index behind the end, an encoding that is none, an error message that is no text.
 @pytest.mark.parametrize(
-    ("name", "seed"), [("mcap", 286), ("realsense", 60), ("realsense", 98), ("ros-mcap", 299), ("ros-mcap", 417)]
+    ("name", "seed"),
+    [("mcap", 286), ("nyu", 481), ("realsense", 60), ("realsense", 98), ("ros-mcap", 299), ("ros-mcap", 417)],
 )
 def test_what_was_wrong_once_is_refused_or_read(name, seed, tmp_path):
     good = RECORDINGS[name](tmp_path / "good", np.random.default_rng(0)).path
