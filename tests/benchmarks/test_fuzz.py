@@ -31,3 +31,14 @@ def test_damaged_recordings_are_refused_or_read(name, tmp_path):
     outcomes = [(seed, run_case(good, seed, tmp_path / "case")) for seed in range(10_000, 10_000 + CASES)]
     assert [(seed, outcome.text) for seed, outcome in outcomes if outcome.kind == "WRONG"] == []
     assert any(outcome.kind == "refused" for _, outcome in outcomes)
+
+
+# What the thousands found: an index behind the end, an encoding that is none, an error message that is no text.
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [("mcap", 286), ("nyu", 481), ("realsense", 60), ("realsense", 98), ("ros-mcap", 299), ("ros-mcap", 417)],
+)
+def test_what_was_wrong_once_is_refused_or_read(name, seed, tmp_path):
+    good = RECORDINGS[name](tmp_path / "good", np.random.default_rng(0)).path
+    outcome = run_case(good, seed, tmp_path / "case")
+    assert outcome.kind in ("refused", "read"), outcome.text
