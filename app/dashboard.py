@@ -9,14 +9,25 @@ import panel as pn
 import panel_material_ui as pmu
 import param
 
+from app.address import Address, follow_in, place_of
 from app.controller import Controller
+from app.keeper import Keeper
+from app.presets import Presets
+from app.preview import Previewer
+from app.reruns import Reruns
 from app.runner import Runner
 from app.server import bundled, kernels, open_shared, renderer
+from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
+from app.views.again_card import AgainCard
+from app.views.export_card import ExportCard
+from app.views.fold import folded
+from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
 from app.views.messages import Messages
 from app.views.modes import Modes
+from app.views.runs_card import RunsCard
 from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
 from app.views.start_card import StartCard
@@ -26,33 +37,52 @@ from app.views.transport import Transport
 __all__ = ["page"]
 
 _TITLE = "Smart Particle Filter"
-_THEME = {
-    "palette": {"primary": {"main": "#1f4e79"}},
-    "typography": {"fontSize": 13},
-    "components": {"MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}}},
-}
+_BLUE, _LIGHT_BLUE = "#1f4e79", "#8ab8e0"  # links and sliders have to be seen on a light and on a dark page
+
+
+def _theme(primary: str) -> dict[str, Any]:
+    return {
+        "palette": {"primary": {"main": primary}},
+        "typography": {"fontSize": 13},
+        "components": {
+            "MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}},
+            "MuiAppBar": {"styleOverrides": {"root": {"backgroundColor": f"{_BLUE} !important", "color": "white"}}},
+        },
+    }
+
+
+_THEME = {"light": _theme(_BLUE), "dark": _theme(_LIGHT_BLUE)}
 _LOOK = 0.5  # s between two looks at the server's kernels
 
 
 def page() -> pmu.Page:
     """Build the page of one visitor."""
-    pn.extension()
+    pn.extension("tabulator")
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
-    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait)
+    shelf, presets = Shelf(), Presets()
+    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf))
+    reruns, previewer = Reruns(controller, shelf), Previewer(state)
+    address = Address(state, controller, reruns, samples)
     session = SessionCard(state, controller.open, samples, uploads)
-    lanes, settings = LanesCard(state, controller), SettingsCard(state)
+    lanes, settings = LanesCard(state, controller), SettingsCard(state, presets)
+    again, landscape = AgainCard(state, reruns), LandscapeCard(state)
+    runs = folded("Runs", lambda: [RunsCard(state, shelf, reruns).panel])
+    export = folded("Export", lambda: [ExportCard(state, controller, renderer(), shelf.folder).panel])
     start = StartCard(state, controller.start)
     main = [Transport(state, controller).panel, Messages(state).panel, modes.panel]
     line = {"margin": (2, 10)}
     sidebar = [
         session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
+        landscape.panel, again.panel, pmu.Divider(**line), runs, export,
     ]  # fmt: skip
 
     async def first() -> None:
         modes.pictures.request()
-        if samples:
-            await controller.open(next(iter(samples.values())))
+        location = pn.state.location
+        await address.go(place_of({} if location is None else location.query_params))
+        if location is not None:
+            follow_in(location, state, address)
         while progress := kernels().progress:
             state.preparing = progress
             await asyncio.sleep(_LOOK)
@@ -60,15 +90,17 @@ def page() -> pmu.Page:
 
     def gone(_context: Any) -> None:
         controller.close()
+        previewer.close()
         uploads.close()
 
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
         title=_TITLE, header=[modes.switch(controller.show_mode), Status(state, controller.cancel).panel],
-        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=False,
+        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip
+    built.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     with param.edit_constant(built):
         built.busy = False  # it follows every message otherwise, and the browser lays the whole page out anew each time
     return built

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Frame
 from spf.optimisers.trajectory import Trajectory
+from spf.sessions import Session
 from spf.settings import Settings
 from spf.track import TrackedFrame, Tracking, TrackState
+from spf.trackfile import TrackRow, row_of
 
 __all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules"]
 
-PATH_POSES = 26  # poses kept of a trajectory of SMD: enough to draw it
+KEYFRAME = 10  # every so many frames, the state is kept for good
 MEMORY = 128 * 2**20  # bytes of entries that one lane of a page keeps
 
 
@@ -26,12 +29,14 @@ class Entry(NamedTuple):
         state: after it, to track on from here.
         tracking: what it was tracked with.
         seen: what was taken for the hand; None while nothing was.
+        before: the state that the frame was tracked from, to track it once more.
     """
 
     result: TrackedFrame
     state: TrackState
     tracking: Tracking
     seen: Seen | None
+    before: TrackState
 
 
 class Seen(NamedTuple):
@@ -58,6 +63,9 @@ class Summary(NamedTuple):
         lost: whether the hand is lost.
         recovered: whether it was found again in this frame.
         ess: effective sample size, nan while lost.
+        optimised_share: weight of the optimised samples, nan while lost.
+        resampled: whether the particles were resampled; False where that is not known, in a run from disk.
+        winner: proposal of the heaviest particle; "" while lost.
         golden, overlap: how well the render explains the depth, nan while lost.
         error: mean distance of the joints from the truth, m; nan where there is no truth.
         seconds: spent on the frame.
@@ -69,6 +77,9 @@ class Summary(NamedTuple):
     lost: bool
     recovered: bool
     ess: float
+    optimised_share: float
+    resampled: bool
+    winner: str
     golden: float
     overlap: float
     error: float
@@ -84,27 +95,74 @@ class Results:
         self._entries: dict[int, Entry] = {}
         self._sizes: dict[int, int] = {}
         self._summaries: dict[int, Summary] = {}
+        self._rows: dict[int, TrackRow] = {}
+        self._states: dict[int, TrackState] = {}
+
+    @classmethod
+    def reopened(
+        cls, rows: Sequence[TrackRow], states: Mapping[int, TrackState], tracking: Callable[[int], Tracking],
+        session: Session, report: Callable[[str, float], None],
+    ) -> Results:  # fmt: skip
+        """Return what was read from disk: everything but the particles, which are tracked again from the nearest state."""
+        results = cls()
+        for done, row in enumerate(rows, 1):
+            index = row.result.index
+            results._rows[index] = row
+            results._summaries[index] = _summary_of(row, session[index], tracking(index), resampled=False)
+            report("Opening the run", done / len(rows))
+        results._states = dict(states)
+        return results
 
     def add(self, entry: Entry, frame: Frame) -> None:
         """Store a frame; whatever was tracked after it no longer follows from it and is dropped."""
         index = entry.result.index
-        for later in [i for i in self._summaries if i >= index]:
-            self._drop(later)
-        result = entry.result
+        self.cut(index)
+        row, info = row_of(entry.result), entry.result.info
+        self._rows[index] = row
+        if index % KEYFRAME == 0:
+            self._states[index] = entry.state
+        self._summaries[index] = _summary_of(row, frame, entry.tracking, resampled=info is not None and info.resampled)
+        self.recall(entry)
+
+    def recall(self, entry: Entry) -> None:
+        """Have everything of a tracked frame in memory (again)."""
+        index = entry.result.index
+        self._entries.pop(index, None)
         self._entries[index] = entry
         self._sizes[index] = _bytes(entry)
-        self._summaries[index] = Summary(
-            index, result.joints, result.lost, result.recovered, result.ess, result.golden, result.overlap,
-            joint_error(result.joints, frame), result.seconds, entry.tracking,
-        )  # fmt: skip
         while sum(self._sizes.values()) > self._memory and len(self._entries) > 1:
             oldest = next(iter(self._entries))
             del self._entries[oldest], self._sizes[oldest]
 
-    def _drop(self, index: int) -> None:
-        del self._summaries[index]
-        self._entries.pop(index, None)
-        self._sizes.pop(index, None)
+    def cut(self, index: int) -> None:
+        """Drop a frame and all after it: they no longer follow from what comes before."""
+        parts: tuple[dict[int, Any], ...] = (self._summaries, self._rows, self._states, self._entries, self._sizes)
+        for part in parts:
+            for later in [i for i in part if i >= index]:
+                del part[later]
+
+    def copy(self) -> Results:
+        """Return results that grow apart from these from now on."""
+        other = Results(self._memory)
+        other._summaries, other._rows, other._states = dict(self._summaries), dict(self._rows), dict(self._states)
+        other._entries, other._sizes = dict(self._entries), dict(self._sizes)
+        return other
+
+    @property
+    def rows(self) -> list[TrackRow]:
+        """What a track keeps of the frames, in their order."""
+        return list(self._rows.values())
+
+    @property
+    def states(self) -> dict[int, TrackState]:
+        """Frame → state after it, of every tenth frame and the last one that is in memory: what is kept on disk."""
+        ends = [i for i in (self.last,) if i in self._entries]
+        return {**self._states, **{i: self._entries[i].state for i in ends if i is not None}}
+
+    def state(self, index: int) -> TrackState | None:
+        """Return the state after a frame, if it is in memory."""
+        entry = self._entries.get(index)
+        return entry.state if entry is not None else self._states.get(index)
 
     def entry(self, index: int) -> Entry | None:
         """Return everything of a frame, or None when it was not tracked or is no longer in memory."""
@@ -142,22 +200,28 @@ def joint_error(joints: NDArray[np.float64], frame: Frame) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking) -> Entry:
-    """Return what is kept of a frame: trajectories of at most PATH_POSES poses each, and what views show of the depth."""
+def _summary_of(row: TrackRow, frame: Frame, tracking: Tracking, *, resampled: bool) -> Summary:
+    result = row.result
+    return Summary(
+        result.index, result.joints, result.lost, result.recovered, result.ess, row.optimised_share, resampled,
+        row.winner, result.golden, result.overlap, joint_error(result.joints, frame), result.seconds, tracking,
+    )  # fmt: skip
+
+
+def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before: TrackState) -> Entry:
+    """Return what is kept of a frame: trajectories in single precision, and what views show of the depth."""
     info, observation = result.info, result.observation
     if info is not None:
-        info = info._replace(trajectories=tuple(_thin(trace) for trace in info.trajectories))
+        info = info._replace(trajectories=tuple(_light(trace) for trace in info.trajectories))
     seen = None
     if observation is not None:
         points = observation.hand_points.astype(np.float32)
         seen = Seen(observation.top, observation.left, observation.depth > 0, points)
-    return Entry(result._replace(info=info, observation=None), state, tracking, seen)
+    return Entry(result._replace(info=info, observation=None), state, tracking, seen, before)
 
 
-def _thin(trace: Trajectory) -> Trajectory:
-    count = len(trace.poses)
-    kept = np.unique(np.linspace(0, count - 1, min(count, PATH_POSES)).round().astype(np.intp))
-    return Trajectory(*(part[kept] for part in trace))
+def _light(trace: Trajectory) -> Trajectory:
+    return Trajectory(*(part.astype(np.float32) for part in trace))
 
 
 def same_rules(tracking: Tracking, tracker: str, settings: Settings) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 import param
 
 from app.lane import Lane, Origin
+from app.look import Look
 from app.results import Entry, Summary
 from spf.errors import SettingError
 from spf.initialise import Doubted
@@ -41,6 +42,7 @@ class State(param.Parameterized):
     """
 
     session: Session | None = param.ClassSelector(class_=Session, doc="what is tracked")
+    camera: str = param.String("", doc="camera file that the session was opened with")
     frame: int = param.Integer(0, bounds=(0, None), doc="index of the frame shown")
     origin: Origin | None = param.ClassSelector(class_=Origin, doc="where all lanes begin; None before Start")
     revision: int = param.Integer(0)
@@ -55,14 +57,24 @@ class State(param.Parameterized):
     lanes: tuple[Lane, ...] = param.ClassSelector(class_=tuple, default=())
     lane: Lane = param.ClassSelector(class_=Lane, doc="the one whose settings are edited, and that is shown alone")
     rules: int = param.Integer(0)
+    shelf: int = param.Integer(0, doc="counts up when a run was kept, named or deleted")
+
+    preview: Any = param.Parameter(None, doc="app.preview.Preview of the frame shown, or nothing")
+    previewed: int = param.Integer(0, doc="counts up with every preview")
+    landscape_of: tuple[int, int] = param.ClassSelector(class_=tuple, default=(0, 1), doc="entries of the pose")
 
     playing: bool = param.Boolean(False)
+    speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")
+    loop: bool = param.Boolean(False, doc="whether play begins again at the end of what was tracked")
+    span: tuple[int, ...] = param.ClassSelector(class_=tuple, default=(), doc="first and last frame played, or nothing")
     task: str = param.String("", doc="what is being done in the background, or nothing")
     share: float = param.Number(0.0, bounds=(0.0, 1.0), doc="of the task that is done")
+    left: str = param.String("", doc="how long the task still takes, in words, or nothing")
     preparing: str = param.String("", doc="what the server does before it is quick, or nothing")
     error: str = param.String("")
     warning: str = param.String("")
 
+    dark: bool = param.Boolean(False, doc="whether the page is dark")
     with_truth: bool = param.Boolean(True, doc="whether the truth is drawn too")
     azimuth: float = param.Number(0.0)
     elevation: float = param.Number(0.0)
@@ -71,6 +83,7 @@ class State(param.Parameterized):
     def __init__(self, **params: Any) -> None:
         first = Lane(colour=COLOURS[0])
         super().__init__(lanes=(first,), lane=first, **params)
+        self.look = Look()
         self._watch_lane(first)
 
     # ---- lanes
@@ -128,13 +141,13 @@ class State(param.Parameterized):
 
     # ---- the run
 
-    def load(self, session: Session) -> None:
+    def load(self, session: Session, camera: str = "") -> None:
         """Show a session from its first frame, with nothing tracked."""
         for lane in self.lanes:
             lane.clear()
         init = "auto" if self.init == "truth" and not session.has_truth else self.init
         self.param.update(
-            session=session, frame=0, origin=None, init=init, error="", warning="", playing=False,
+            session=session, camera=camera, frame=0, origin=None, init=init, error="", warning="", playing=False, span=(),
             revision=self.revision + 1,
         )  # fmt: skip
 
@@ -144,7 +157,7 @@ class State(param.Parameterized):
             lane.clear()
         start = origin.start
         doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
-        warning = " ".join(text for text in (doubt, available_network()[1]) if text)
+        warning = " ".join(text for text in (doubt, start.remark, available_network()[1]) if text)
         self.param.update(
             origin=origin, frame=start.frame, error="", warning=warning, revision=self.revision + 1
         )  # fmt: skip
@@ -160,6 +173,15 @@ class State(param.Parameterized):
         """Show a frame, and what was tracked in it."""
         self.param.update(frame=frame, revision=self.revision + 1)
 
+    def span_from(self, frame: int) -> None:
+        """Play from a frame on, to the end of the range if that comes after it."""
+        last = len(self.session) - 1 if self.session is not None else frame
+        self.span = (frame, self.span[1] if self.span and self.span[1] >= frame else last)
+
+    def span_to(self, frame: int) -> None:
+        """Play to a frame, from the beginning of the range if that comes before it."""
+        self.span = (self.span[0] if self.span and self.span[0] <= frame else 0, frame)
+
     @property
     def busy(self) -> bool:
         """Whether something runs in the background."""
@@ -167,8 +189,14 @@ class State(param.Parameterized):
 
     @property
     def entry(self) -> Entry | None:
-        """Everything of the frame shown in the chosen lane, or None when it was not tracked or is no longer in memory."""
-        return self.lane.entry(self.frame)
+        """Everything of the frame shown in the chosen lane, weighed as its settings are now.
+
+        None when it was not tracked or is no longer in memory.
+        """
+        base = self.lane.entry(self.frame)
+        if self.preview is not None and self.preview.base is base and self.preview.settings == self.lane.settings:
+            return self.preview.entry  # type: ignore[no-any-return]
+        return base
 
     @property
     def summary(self) -> Summary | None:
@@ -207,3 +235,4 @@ class State(param.Parameterized):
     def reset_view(self) -> None:
         """Look from where the sensor is."""
         self.param.update(azimuth=0.0, elevation=0.0, zoom=1.0)
+        self.look.pan = (0.0, 0.0)

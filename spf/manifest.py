@@ -20,10 +20,19 @@ from spf.sessions import Session
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
-__all__ = ["Plan", "live_manifest_of", "manifest_of", "plan_of", "read_manifest", "write_manifest"]
+__all__ = ["Change", "Plan", "live_manifest_of", "manifest_of", "plan_of", "read_manifest", "write_manifest"]
 
 _FORMAT = "spf-run"
 _PACKAGES = ("numpy", "numba", "scipy", "opencv-python-headless")
+
+
+class Change(NamedTuple):
+    """From a frame on, a run goes on with another tracker, other settings or another seed."""
+
+    frame: int
+    tracker: str
+    settings: Settings
+    seed: int
 
 
 class Plan(NamedTuple):
@@ -37,6 +46,7 @@ class Plan(NamedTuple):
         init: how the start was made: ``auto``, ``truth`` or a pose file.
         first, last: frames ``[first, last)`` are tracked.
         start: first pose and hand shape.
+        changes: on the way, in the order of their frames.
     """
 
     tracker: str
@@ -47,6 +57,7 @@ class Plan(NamedTuple):
     first: int
     last: int
     start: Start
+    changes: tuple[Change, ...] = ()
 
 
 def manifest_of(plan: Plan, session: Session, camera_file: Path | None, command: list[str]) -> dict[str, Any]:
@@ -105,6 +116,7 @@ def _manifest(plan: Plan, session: dict[str, Any], command: list[str]) -> dict[s
         "preset": plan.preset,
         "settings": plan.settings.to_dict(),
         "seed": plan.seed,
+        "changes": [{**change._asdict(), "settings": change.settings.to_dict()} for change in plan.changes],
         "init": plan.init,
         "frames": [plan.first, plan.last],
         "start": {"golden": start.golden, "margin": start.margin, "doubt": start.doubt, **saved.to_dict()},
@@ -137,11 +149,17 @@ def plan_of(manifest: dict[str, Any], source: str = "The manifest") -> Plan:
             first,
             last,
             start,
+            tuple(_change_of(change) for change in manifest.get("changes", [])),
         )
     except (KeyError, TypeError, ValueError) as error:
         if isinstance(error, SpfError):
             raise
         raise RunError(f"{source} is damaged or of another version of this program ({error}).") from None
+
+
+def _change_of(content: dict[str, Any]) -> Change:
+    settings = TRACKERS[content["tracker"]].settings().replace(**content["settings"])
+    return Change(int(content["frame"]), content["tracker"], settings, int(content["seed"]))
 
 
 def write_manifest(manifest: dict[str, Any], path: Path) -> None:

@@ -11,17 +11,20 @@ from spf.errors import RunError
 from spf.hand.kinematics import joints_of
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.sessions import Session, open_session
-from spf.track import TrackedFrame, Tracking, TrackState, begin, run
+from spf.track import TrackedFrame, Tracking, TrackState, begin, run, track_frame
 from spf.trackfile import Track, TrackRow, read_track, row_of, track_of, write_track
 
 __all__ = [
+    "MANIFEST",
     "RECORDING",
+    "TRACK",
     "Run",
     "RunWriter",
     "begin_late",
     "check_same_session",
     "read_run",
     "reopen_session",
+    "save_run",
     "track_plan",
 ]
 
@@ -81,7 +84,13 @@ def track_plan(session: Session, plan: Plan, frames: Sequence[int] | None = None
             index, float(session.times[index]), plan.start.pose, plan.start.reference, joints, True, False,
             nan, nan, nan, nan, 0.0, {}, None, None,
         )  # fmt: skip
-    yield from run(tracking, state, (session[index] for index in range(plan.start.frame, plan.last)))
+    changes = {change.frame: change for change in plan.changes}
+    for index in range(plan.start.frame, plan.last):
+        if index in changes:
+            change = changes[index]
+            tracking = tracking._replace(tracker=change.tracker, settings=change.settings, seed=change.seed)
+        state, result = track_frame(tracking, state, session[index])
+        yield result
 
 
 class RunWriter:
@@ -126,9 +135,7 @@ class RunWriter:
         self._manifest = {**manifest, "complete": False, "frames_tracked": len(self._rows)}
 
     def _save(self, *, complete: bool) -> None:
-        write_track(self.track, self._directory / TRACK)
-        self._manifest |= {"complete": complete, "frames_tracked": len(self._rows)}
-        write_manifest(self._manifest, self._directory / MANIFEST)
+        self._manifest = save_run(self._directory, self._manifest, self.track, complete=complete)
 
     @property
     def track(self) -> Track:
@@ -142,6 +149,18 @@ class RunWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._save(complete=kind is None)
+
+
+def save_run(directory: Path, manifest: dict[str, Any], track: Track, *, complete: bool) -> dict[str, Any]:
+    """Write a run into its directory, over what it held of the same run; return the manifest as it was written.
+
+    Raises:
+        RunError: the directory cannot be written to.
+    """
+    write_track(track, directory / TRACK)
+    manifest = {**manifest, "complete": complete, "frames_tracked": len(track)}
+    write_manifest(manifest, directory / MANIFEST)
+    return manifest
 
 
 def check_free(directory: Path, overwrite: bool) -> None:

@@ -16,7 +16,7 @@ from spf.errors import RunError
 from spf.frame import JOINT_NAMES
 from spf.track import TrackedFrame
 
-__all__ = ["Track", "TrackRow", "read_track", "row_of", "track_of", "write_track"]
+__all__ = ["Track", "TrackRow", "read_track", "row_of", "rows_of", "table_of", "track_of", "write_track"]
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,7 @@ class Track(NamedTuple):
         joints: (N, 21, 3) m, of the hand model.
         lost, recovered: (N,) whether the hand is lost in a frame, and whether it was found again in it.
         log_likelihood, ess, golden, overlap, optimised_share, evaluations: (N,) NaN where no filter step was made.
+        winner: (N,) proposal that the heaviest particle came from; "" where no filter step was made.
         seconds: (N,) spent on the frame; 0 for frames before the first pose, which no tracker looked at.
         dof_names: D names of the entries of a pose.
         timings: stage → (N,) seconds; NaN in frames without that stage.
@@ -55,6 +56,7 @@ class Track(NamedTuple):
     overlap: Array
     optimised_share: Array
     evaluations: Array
+    winner: NDArray[np.str_]
     seconds: Array
     dof_names: tuple[str, ...]
     timings: dict[str, Array]
@@ -69,11 +71,13 @@ class TrackRow(NamedTuple):
     Attributes:
         result: of the frame, its info and observation left out.
         optimised_share, evaluations: of its info; NaN where there is none.
+        winner: of its info; "" where there is none.
     """
 
     result: TrackedFrame
     optimised_share: float
     evaluations: float
+    winner: str = ""
 
 
 def row_of(result: TrackedFrame) -> TrackRow:
@@ -81,7 +85,7 @@ def row_of(result: TrackedFrame) -> TrackRow:
     bare = result._replace(info=None, observation=None)
     if result.info is None:
         return TrackRow(bare, float("nan"), float("nan"))
-    return TrackRow(bare, result.info.optimised_share, float(result.info.evaluations))
+    return TrackRow(bare, result.info.optimised_share, float(result.info.evaluations), result.info.winner)
 
 
 def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
@@ -108,10 +112,40 @@ def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
         overlap=numbers([result.overlap for result in results]),
         optimised_share=numbers([row.optimised_share for row in rows]),
         evaluations=numbers([row.evaluations for row in rows]),
+        winner=np.array([row.winner for row in rows], dtype=np.str_),
         seconds=numbers([result.seconds for result in results]),
         dof_names=dof_names,
         timings={stage: numbers([result.timings.get(stage, nan) for result in results]) for stage in stages},
     )
+
+
+def rows_of(track: Track) -> list[TrackRow]:
+    """Return the frames of a track: the inverse of :func:`track_of`."""
+    rows = []
+    for i in range(len(track)):
+        timings = {stage: float(values[i]) for stage, values in track.timings.items() if np.isfinite(values[i])}
+        likelihood, ess, golden, overlap, seconds = (
+            float(getattr(track, name)[i]) for name in ("log_likelihood", "ess", "golden", "overlap", "seconds")
+        )
+        result = TrackedFrame(
+            int(track.frame[i]), float(track.time[i]), track.poses[i], track.references[i], track.joints[i],
+            bool(track.lost[i]), bool(track.recovered[i]), likelihood, ess, golden, overlap, seconds, timings, None, None,
+        )  # fmt: skip
+        rows.append(
+            TrackRow(result, float(track.optimised_share[i]), float(track.evaluations[i]), str(track.winner[i]))
+        )
+    return rows
+
+
+def table_of(track: Track) -> pa.Table:
+    """Return a track as a table with named columns, one row a frame."""
+    columns: dict[str, Any] = {"frame": track.frame, "time": track.time}
+    columns |= {"lost": track.lost, "recovered": track.recovered, "winner": track.winner.tolist()}
+    columns |= {name: getattr(track, name) for name in _NUMBERS}
+    columns |= {_POSE + name: track.poses[:, i] for i, name in enumerate(track.dof_names)}
+    columns |= _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints)
+    columns |= {_STAGE + stage: values for stage, values in track.timings.items()}
+    return pa.table(columns)
 
 
 def write_track(track: Track, path: Path) -> None:
@@ -120,15 +154,9 @@ def write_track(track: Track, path: Path) -> None:
     Raises:
         RunError: the file cannot be written.
     """
-    columns: dict[str, Any] = {"frame": track.frame, "time": track.time}
-    columns |= {"lost": track.lost, "recovered": track.recovered}
-    columns |= {name: getattr(track, name) for name in _NUMBERS}
-    columns |= {_POSE + name: track.poses[:, i] for i, name in enumerate(track.dof_names)}
-    columns |= _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints)
-    columns |= {_STAGE + stage: values for stage, values in track.timings.items()}
     part = path.with_name(path.name + ".part")
     try:
-        pq.write_table(pa.table(columns), part)
+        pq.write_table(table_of(track), part)
         os.replace(part, path)
     except OSError as error:
         raise RunError(f"The track {path} cannot be written: {error.strerror or error}.") from None
@@ -171,6 +199,8 @@ def read_track(path: Path) -> Track:
         lost=found["lost"],
         recovered=found["recovered"],
         **{name: found[name] for name in _NUMBERS},
+        # Tracks that were written before proposals were counted have no such column.
+        winner=np.asarray(found.get("winner", [""] * len(table)), dtype=np.str_),
         dof_names=dof_names,
         timings={name.removeprefix(_STAGE): found[name] for name in found if name.startswith(_STAGE)},
     )

@@ -8,11 +8,13 @@ from typing import Any
 import panel as pn
 
 from app.lane import Lane
+from app.look import Shown
 from app.results import Entry
 from app.state import COLOURS, State
 from app.views.curves import ERROR, ESS, GOLDEN, MILLISECONDS, OVERLAP, Curves
 from app.views.depth import Depth
 from app.views.detail import truth_switch
+from app.views.difference import Difference
 from app.views.grid import card, cards
 from app.views.plots import BEFORE, heading
 from app.views.scenes import reconstruction_of
@@ -44,20 +46,20 @@ class Comparison:
             colour: card(self.pictures.panes[colour], self._heads[colour], _HAND_HEIGHT, least_width=220)
             for colour in COLOURS
         }
-        depth, table = Depth(state, "compare"), Table(state)
+        depth, table, difference = Depth(state, "compare"), Table(state), Difference(state)
         error, *others = [Curves(state, q, "compare") for q in (ERROR, GOLDEN, OVERLAP, ESS, MILLISECONDS)]
         middle = (
             card(depth.pane, heading("Depth", ("●", BEFORE, "truth")), _DEPTH_HEIGHT, truth_switch(state)),
             card(error.pane, error.heading, _DEPTH_HEIGHT),
             card(table.pane, heading("So far"), _DEPTH_HEIGHT, least_width=340),
         )
-        curves = (card(plot.pane, plot.heading, _PLOT_HEIGHT, least_width=220) for plot in others)
+        curves = (card(plot.pane, plot.heading, _PLOT_HEIGHT, least_width=220) for plot in (difference, *others))
         self.panel = pn.Column(
             cards(*self._hands.values()), cards(*middle), cards(*curves), sizing_mode="stretch_width", margin=0
         )
         state.param.watch(self._follow, ["lanes", "rules", "revision"])
         self._follow()
-        for drawn in (depth.draw, table.draw, error.draw, *(plot.draw for plot in others)):
+        for drawn in (depth.draw, table.draw, error.draw, difference.draw, *(plot.draw for plot in others)):
             drawn()
 
     def _lanes(self) -> dict[str, Lane]:
@@ -76,7 +78,7 @@ def _heading(lane: Lane, frame: int) -> str:
     return heading(f"<span style='color:{lane.colour}'>■</span> {html.escape(lane.title)}{loss}")
 
 
-def _scene(colour: str, entry: Entry) -> Scene | None:
+def _scene(colour: str, entry: Entry, _shown: Shown) -> Scene | None:
     return reconstruction_of(entry, _pale(colour))
 
 

@@ -9,10 +9,12 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmu
 
+from app.presets import Presets
 from app.state import State
 from app.views.fold import folded
+from spf.errors import SettingError
 from spf.settings import SettingInfo
-from spf.trackers import PRESETS, TRACKERS
+from spf.trackers import TRACKERS
 
 __all__ = ["SettingsCard"]
 
@@ -24,15 +26,17 @@ SLIDERS: dict[str, tuple[str, float, float, float]] = {
     "h": ("window of the density", 0.1, 12.0, 0.1),
 }
 
+_AS_IT_IS = "As in the preset. A change is for the frames tracked from now on."
+
 
 class SettingsCard:
     """The card; its fields are those that the tracker declares."""
 
-    def __init__(self, state: State) -> None:
-        self._state = state
+    def __init__(self, state: State, presets: Presets | None = None) -> None:
+        self._state, self._presets = state, presets or Presets()
         options: dict[str, Any] = {"size": "small", "sizing_mode": "stretch_width"}
         self._tracker = pmu.Select(label="Tracker", options={t.title: t.name for t in TRACKERS.values()}, **options)
-        self._preset = pmu.Select(label="Preset", options=list(PRESETS), **options)
+        self._preset = pmu.Select(label="Preset", options=self._presets.names(state.lane.tracker), **options)
         self._infos: dict[str, SettingInfo] = {}
         self._fields: dict[str, Any] = {}
         self._made_for = ""
@@ -40,21 +44,45 @@ class SettingsCard:
         self._others = pmu.Column(sizing_mode="stretch_width", margin=0)
         self._unfolded = False
         self._hint = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
+        small: dict[str, Any] = {"variant": "text", "size": "small", "margin": (0, 4)}
+        self._undo = pmu.Button(label="Undo", icon="undo", on_click=lambda _event: state.lane.undo(), **small)
         self._back = pmu.Button(
-            label="Back to the preset", icon="undo", variant="text", size="small", visible=False,
-            on_click=lambda _event: state.lane.back_to_preset(), margin=(0, 4),
+            label="Back to the preset", icon="settings_backup_restore", visible=False,
+            on_click=lambda _event: state.lane.back_to_preset(), **small,
         )  # fmt: skip
+        self._name = pmu.TextInput(label="Name of a new preset", size="small", sizing_mode="stretch_width")
+        save = pmu.Button(label="Save", icon="save", size="small", on_click=self._save, margin=(10, 10))
         self._tracker.param.watch(self._picked("tracker"), "value")
         self._preset.param.watch(self._picked("preset"), "value")
         state.param.watch(self._follow, ["rules", "lane"])
         self._follow()
         self.panel = pmu.Column(
-            self._tracker, self._preset, self._sliders, self._hint, self._back,
-            folded("All other settings", self._unfold), sizing_mode="stretch_width",
+            self._tracker, self._preset, self._sliders, self._hint,
+            pmu.Row(self._undo, self._back, margin=0),
+            folded("All other settings", self._unfold),
+            folded("Save as a preset", lambda: [pmu.Row(self._name, save, sizing_mode="stretch_width", margin=0)]),
+            sizing_mode="stretch_width",
         )  # fmt: skip
 
     def _picked(self, name: str) -> Callable[[Any], None]:
-        return lambda event: setattr(self._state.lane, name, event.new)
+        def picked(event: Any) -> None:
+            if event.new is None or event.new == getattr(self._state.lane, name):
+                return
+            try:
+                setattr(self._state.lane, name, event.new)
+            except SettingError as error:
+                self._state.error = str(error)
+
+        return picked
+
+    def _save(self, _event: Any) -> None:
+        lane, name = self._state.lane, (self._name.value_input or self._name.value).strip()
+        try:
+            self._presets.save(lane.tracker, name, lane.settings)
+            lane.preset = name
+            self._state.error = ""
+        except SettingError as error:
+            self._state.error = str(error)
 
     def _unfold(self) -> list[Any]:
         self._unfolded = True
@@ -93,7 +121,9 @@ class SettingsCard:
 
     def _follow(self, *_events: Any) -> None:
         lane = self._state.lane
-        self._tracker.value, self._preset.value = lane.tracker, lane.preset
+        self._tracker.value = lane.tracker
+        self._preset.param.update(options=self._presets.names(lane.tracker), value=lane.preset)
+        self._undo.disabled = not lane.can_undo
         if self._made_for != lane.tracker:
             self._make()
         values = lane.settings.to_dict()
@@ -107,9 +137,9 @@ class SettingsCard:
         words = ", ".join(f"{name} {_short(was)} → {_short(now)}" for name, (was, now) in changed.items())
         style = "font:12px/1.4 Roboto,sans-serif;color:"
         self._hint.object = (
-            f"<div style='{style}#8a4b00'>Differs from the preset: {words}</div>"
+            f"<div style='{style}var(--warning-text-color,#8a4b00)'>Differs from the preset: {words}</div>"
             if changed
-            else f"<div style='{style}#5c6873'>As in the preset. A change takes effect with the next step.</div>"
+            else f"<div style='{style}var(--panel-on-background-color,#5c6873);opacity:0.8'>{_AS_IT_IS}</div>"
         )
 
 
@@ -121,6 +151,15 @@ def _label(info: SettingInfo) -> str:
     words = info.name.replace("_", " ")
     name = f"{info.symbol} · {words}" if info.symbol and info.symbol != info.name else words
     return f"{name}, {info.unit}" if info.unit else name
+
+
+def _described(info: SettingInfo) -> str:
+    """Its meaning, range, unit and default."""
+    default = _short(info.default) if info.kind is not bool else ("on" if info.default else "off")
+    parts = [f"{info.meaning[0].upper()}{info.meaning[1:]}."]
+    if info.low is not None and info.high is not None:
+        parts.append(f"From {info.low:g} to {info.high:g}{' ' + info.unit if info.unit else ''}.")
+    return " ".join([*parts, f"By default {default}; --set {info.name}=…"])
 
 
 def _ends(info: SettingInfo, value: float) -> dict[str, float]:
@@ -140,13 +179,13 @@ def _slider(info: SettingInfo, value: Any) -> Any:
     unit = f", {info.unit}" if info.unit else ""
     return kind(
         label=f"{info.symbol or info.name} · {heading}{unit}", value=value, step=info.kind(step),
-        description=info.meaning, size="small", sizing_mode="stretch_width", margin=(4, 16, 0, 12), **_ends(info, value),
+        description=_described(info), size="small", sizing_mode="stretch_width", margin=(4, 16, 0, 12), **_ends(info, value),
     )  # fmt: skip
 
 
 def _field(info: SettingInfo, value: Any) -> Any:
     options: dict[str, Any] = {
-        "label": _label(info), "value": value, "description": info.meaning, "size": "small",
+        "label": _label(info), "value": value, "description": _described(info), "size": "small",
         "sizing_mode": "stretch_width",
     }  # fmt: skip
     if info.kind is bool:

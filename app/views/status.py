@@ -27,14 +27,14 @@ class Status:
             label="Cancel", icon="close", size="small", variant="outlined", on_click=lambda _event: cancel(),
             margin=(2, 8), sx=_LIGHT,
         )  # fmt: skip
-        state.param.watch(self._follow, ["task", "share", "preparing"])
+        state.param.watch(self._follow, ["task", "share", "left", "preparing"])
         self.panel = pmu.Row(self._text, self._bar, self._stop, visible=False, margin=0)
         self._follow()
 
     def _follow(self, *_events: Any) -> None:
         state = self._state
         text = state.task or state.preparing
-        self._text.object = text
+        self._text.object = f"{text} · {state.left}" if state.left and state.task else text
         self._stop.visible = bool(state.task)
         self._bar.param.update(
             value=round(100 * state.share), variant="determinate" if state.share > 0 else "indeterminate"

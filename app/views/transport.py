@@ -1,91 +1,144 @@
-"""Restart, step, play, pause and the slider over the frames."""
+"""The time line with its buttons and keys: it shows what every lane has tracked, and passes on what the visitor wants."""
 
 from __future__ import annotations
 
+import inspect
+import math
+from collections.abc import Callable
+from itertools import groupby
 from typing import Any
 
-import panel as pn
+import numpy as np
 import panel_material_ui as pmu
-import param
 
 from app.controller import Controller
+from app.lane import Lane
+from app.results import Summary
 from app.state import State
+from app.views.follower import Follower
+from app.views.plots import CALM
+from app.views.time_line import TimeLine
 
-__all__ = ["Transport"]
+__all__ = ["Transport", "ranges"]
 
-# What the slider's throttled value is put back to after each jump, so that a jump to the same frame is an event again.
-# The value itself won't do: the browser echoes what the server sets, late, and that would be taken for a jump back.
-_NOWHERE = -1
+_ROOM = 1.1  # of the chart above its highest value
+_USUAL = 97.0  # percentage of the values that the chart has to hold
 
 
-class Transport:
-    """The row under the heading."""
+class Transport(Follower):
+    """The part under the heading: what is shown is at once at the frame, what was tracked follows while playing."""
 
     def __init__(self, state: State, controller: Controller) -> None:
-        self._state, self._controller = state, controller
-        button = {"variant": "outlined", "size": "small", "margin": (8, 4)}
-        self._restart = pmu.Button(label="Restart", icon="replay", on_click=self._on_restart, **button)
-        self._step = pmu.Button(label="Step", icon="skip_next", on_click=self._on_step, **button)
-        self._play = pmu.Button(label="Play", icon="play_arrow", on_click=self._on_play, width=104, size="small",
-                                margin=(8, 4))  # fmt: skip
-        self._slider = pmu.IntSlider(
-            label="", show_value=False, css_classes=["frame-slider"], start=0, end=1, value=0, disabled=True,
-            sizing_mode="stretch_width", margin=(8, 18), size="small",
-        )  # fmt: skip
-        self._count = pn.pane.HTML("", width=290, margin=(12, 8), align="center")
-        self._rearm()
-        self._slider.param.watch(self._on_slide, "value_throttled")
+        super().__init__(state, None, also=("session", "origin", "mode", "lanes", "lane"))
+        self._controller = controller
+        self.line = TimeLine(self._wish, sizing_mode="stretch_width", margin=(4, 10, 6, 10))
+        self.panel = pmu.Column(self.line, sizing_mode="stretch_width", margin=0)
         state.param.watch(
-            self._follow, ["session", "frame", "revision", "task", "playing", "origin", "mode", "lanes", "lane"]
-        )
-        self._follow()
-        self.panel = pmu.Row(
-            self._restart, self._step, self._play, self._slider, self._count, sizing_mode="stretch_width"
-        )
+            self._point,
+            ["session", "frame", "revision", "task", "playing", "origin", "mode", "lanes", "lane", "span", "loop",
+             "speed", "dark"],
+        )  # fmt: skip
+        self._point()
+        self.draw()
 
-    async def _on_restart(self, _event: Any) -> None:
-        await self._controller.restart()
+    # ---- what the visitor wants
 
-    async def _on_step(self, _event: Any) -> None:
-        await self._controller.step()
+    async def _wish(self, wish: dict[str, Any]) -> None:
+        state, controller, kind = self.state, self._controller, wish["kind"]
+        actions: dict[str, Callable[[], object]] = {
+            "play": controller.pause if state.playing else controller.play,
+            "step": controller.forward, "back": controller.back, "first": controller.first, "last": controller.last,
+            "worst": controller.worst, "loss": controller.next_loss, "restart": controller.restart,
+            "reach": lambda: controller.jump(state.frame),
+            "look": lambda: controller.look(int(wish["frame"])),
+            "loop": lambda: state.param.update(loop=not state.loop),
+            "speed": lambda: state.param.update(speed=float(wish["value"])),
+            "start": lambda: state.span_from(state.frame), "end": lambda: state.span_to(state.frame),
+            "span": lambda: state.param.update(
+                span=(int(wish["start"]), int(wish["end"])) if "start" in wish else ()
+            ),
+        }  # fmt: skip
+        done = actions[kind]()
+        if inspect.isawaitable(done):
+            await done
 
-    async def _on_play(self, _event: Any) -> None:
-        if self._state.playing:
-            self._controller.pause()
-        else:
-            await self._controller.play()
+    # ---- what the state says
 
-    async def _on_slide(self, event: Any) -> None:
-        if event.new == _NOWHERE:
-            return
-        self._rearm()
-        await self._controller.jump(event.new)
+    def _point(self, *_events: Any) -> None:
+        """Say where we are and what can be done: at every frame."""
+        state = self.state
+        self.line.param.update(
+            count=0 if state.session is None else len(state.session), frame=state.frame, playing=state.playing,
+            span=list(state.span), loop=state.loop, speed=state.speed, can=self._possible(), readout=self._readout(),
+            dark=state.dark,
+        )  # fmt: skip
 
-    def _rearm(self) -> None:
-        with param.edit_constant(self._slider):
-            self._slider.value_throttled = _NOWHERE
-
-    def _follow(self, *_events: Any) -> None:
-        state = self._state
-        ready = state.origin is not None and not state.task
-        can_go = ready and state.next_frame is not None
-        self._restart.disabled = not ready
-        self._step.disabled = not can_go or state.playing
-        self._play.param.update(
-            disabled=not (can_go or state.playing),
-            label="Pause" if state.playing else "Play",
-            icon="pause" if state.playing else "play_arrow",
-        )
+    def _possible(self) -> list[str]:
+        state, last = self.state, self.state.last
         if state.session is None:
-            return
-        self._slider.param.update(end=max(len(state.session) - 1, 1), value=state.frame, disabled=False)
-        last = state.last
-        summaries = [lane.summary(state.frame) for lane in state.active]
+            return []
+        ready = state.origin is not None and not state.task
+        possible = {
+            "play": state.playing or (ready and (state.next_frame is not None or last is not None)),
+            "step": not state.playing and ready and state.next_frame is not None,
+            "back": state.frame > 0, "first": True, "last": last is not None, "worst": last is not None,
+            "loss": any(summary.lost for lane in state.active for summary in lane.results.summaries),
+            "start": True, "end": True, "loop": True, "restart": ready,
+            "reach": ready and not state.playing and last is not None and state.frame > last,
+        }  # fmt: skip
+        return [name for name, can in possible.items() if can]
+
+    def _readout(self) -> str:
+        state = self.state
+        if state.session is None:
+            return ""
+        last, summaries = state.last, [lane.summary(state.frame) for lane in state.active]
         tracked = "not tracked" if last is None else f"tracked to {last}"
         took = f" · {1000 * sum(s.seconds for s in summaries if s is not None):.0f} ms" if any(summaries) else ""
         lost = state.lane.loss(state.frame) if state.mode == "one" else ""
-        what = f"<span style='color:#b33c00;font-weight:500'>{lost}</span>" if lost else f"{tracked}{took}"
-        self._count.object = (
-            "<div style='font:13px/1.3 Roboto,sans-serif;color:#2a3038;font-variant-numeric:tabular-nums'>"
-            f"<b>Frame {state.frame}</b> of {len(state.session) - 1} · {what}</div>"
-        )
+        what = f"<span class='lost'>{lost}</span>" if lost else f"{tracked}{took}"
+        return f"<b>Frame {state.frame}</b> of {len(state.session) - 1} · {what}"
+
+    def draw(self) -> None:
+        """Show what was tracked: seldom while playing."""
+        state = self.state
+        lanes, value, unit = state.active, _golden, "golden energy"
+        if state.session is not None and state.session.has_truth:
+            value, unit = _error, "mm"
+        known = [v for lane in lanes for s in lane.results.summaries if (v := value(s)) is not None]
+        top = _rounded(_ROOM * float(np.percentile(known, _USUAL))) if known else 0.0
+        self.line.param.update(lanes=[_row(lane, value, alone=len(lanes) == 1) for lane in lanes], top=top, unit=unit)
+
+
+def _error(summary: Summary) -> float | None:
+    return round(1000 * summary.error, 1) if math.isfinite(summary.error) else None
+
+
+def _golden(summary: Summary) -> float | None:
+    return round(summary.golden, 3) if math.isfinite(summary.golden) else None
+
+
+def _row(lane: Lane, value: Callable[[Summary], float | None], *, alone: bool) -> dict[str, Any]:
+    summaries = lane.results.summaries
+    return {
+        "colour": "#5b86ad" if alone else lane.colour or CALM,
+        "first": summaries[0].frame if summaries else 0,
+        "values": [value(summary) for summary in summaries],
+        "tracked": ranges([summary.frame for summary in summaries]),
+        "lost": ranges([summary.frame for summary in summaries if summary.lost]),
+        "found": ranges([summary.frame for summary in summaries if summary.recovered]),
+    }
+
+
+def ranges(frames: list[int]) -> list[list[int]]:
+    """Return the ranges [first, last] that frames, in their order, make."""
+    runs = [[f for _, f in run] for _, run in groupby(enumerate(frames), lambda pair: pair[1] - pair[0])]
+    return [[run[0], run[-1]] for run in runs]
+
+
+def _rounded(top: float) -> float:
+    """The least round number that is not less: 1, 2, 3, 5 or 8 of a decimal place."""
+    if top <= 0:
+        return 1.0
+    unit = 10.0 ** math.floor(math.log10(top))
+    return next((round(m * unit, 6) for m in (1, 2, 3, 5, 8) if m * unit >= top), round(10 * unit, 6))

@@ -52,9 +52,10 @@ def warn(sentence: str) -> None:
 
 
 def warn_of(start: Start) -> None:
-    """Warn of a start that may be wrong, and say what to do; nothing for one that is believed."""
+    """Warn of a start that may be wrong and of a camera that is, and say what to do; nothing where all is believed."""
     if start.doubted is not None:
         warn(f"{start.doubt} {_REMEDIES[start.doubted]}")
+    warn(start.remark)
 
 
 def print_json(value: Any) -> None:

@@ -27,7 +27,7 @@ from spf.optimisers.trajectory import Trajectory
 from spf.parallel import map_threads
 from spf.settings import setting
 
-__all__ = ["SpfSettings", "step"]
+__all__ = ["SpfSettings", "log_prior", "step"]
 
 Array = NDArray[np.float64]
 _FILTER = "Filter"
@@ -102,21 +102,23 @@ def step(
         evaluations += mixed.evaluations
     clock("recombine")
     scale = noise_scale(hand, settings, interval)
-    log_prior = _log_prior(origins, settings)
+    prior = log_prior(origins, settings)
     if settings.weighting == "laplace":
         centres = np.array([one.prior for one in descents])
-        optimised, log_c = _drawn(problem, predicted, optimised, centres, log_prior, scale, settings, rng)
-        window, log_prior = math.nan, np.zeros_like(log_prior)  # the prior is in the ratio
+        optimised, log_c = _drawn(problem, predicted, optimised, centres, prior, scale, settings, rng)
+        window, prior = math.nan, np.zeros_like(prior)  # the prior is in the ratio
     else:
         window, log_c = correct(predicted, optimised, scale, settings)  # (d) combine, correct
     clock("correct")
     judged = judge(problem, np.concatenate([predicted, optimised]))
     likelihood = log_likelihood(judged, settings, settings.sigma2)
-    log_weights = normalise(log_c + likelihood + log_prior)  # (e) weigh
+    log_weights = normalise(log_c + likelihood + prior)  # (e) weigh
     clock("weigh")
     jumped = np.array([origin in ("structured", "learned") for origin in origins])
     before[jumped] = optimised[jumped]  # a jump is no motion
-    samples = Samples(ancestors, origins, before, predicted, optimised, judged, likelihood, log_c, log_weights, window)
+    samples = Samples(
+        ancestors, origins, before, predicted, optimised, judged, likelihood, log_c, log_weights, window, window * scale
+    )  # fmt: skip
     return conclude(  # (f) estimate
         problem, settings.sigma2, state, interval, samples, clock,
         evaluations=evaluations + len(log_weights), trajectories=trajectories,
@@ -215,7 +217,7 @@ def _drawn(
     return optimised, ratio
 
 
-def _log_prior(origins: tuple[str, ...], settings: SpfSettings) -> Array:
+def log_prior(origins: tuple[str, ...], settings: SpfSettings) -> Array:
     """Log-prior of the predicted, then the optimised samples; -inf for predicted ones that are not kept."""
     predicted = np.zeros(len(origins)) if settings.keep_predicted else np.full(len(origins), -np.inf)
     predicted[settings.n :] += math.log(settings.learned_prior)

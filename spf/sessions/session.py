@@ -55,6 +55,7 @@ class Session(ABC):
         hand_shape: the exact hand shape of a synthetic session, ready for JSON, else None.
         start_time_ns: nanoseconds since 1970 (UTC) of the first frame, 0 where unknown.
         metadata: whatever else is known, as text (``sensor``, ``dataset``, …).
+        contents: one line for everything that its file holds, for people (topics, tracks, arrays).
         notes: markers and notes made while it was recorded, by time.
         warnings: one sentence for everything that a user should know of how it was read.
     """
@@ -71,6 +72,7 @@ class Session(ABC):
     hand_shape: dict[str, Any] | None = None
     start_time_ns: int = 0
     metadata: Mapping[str, str] = field(default_factory=dict)
+    contents: tuple[str, ...] = ()
     notes: tuple[Note, ...] = ()
     warnings: tuple[str, ...] = ()
 

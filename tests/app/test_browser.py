@@ -200,7 +200,7 @@ def test_playing_pausing_jumping_and_orbiting(page):
     picture(page, "Trajectories of optimisation").dblclick()
     settled(page)
     assert np.abs(pixels(page, "Reconstructed hand") - before).mean() < np.abs(turned - before).mean() / 4
-    page.locator(".frame-slider input").focus()
+    page.get_by_role("slider", name="Frame", exact=True).focus()
     page.keyboard.press("Home")
     at_frame(page, 0)
 

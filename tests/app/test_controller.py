@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import app.controller
-from app.views.depth import depth_picture
+from app.views.depth import depth_jpeg
 from app.views.scenes import SCENES, view_of
-from spf.render import ViewCamera
+from spf.render import Skeleton, ViewCamera
 
 
 def started(state, controller, sample, act):
@@ -65,14 +65,15 @@ def test_a_jump_back_shows_the_stored_frame_and_a_step_shows_it_again(page, samp
     assert state.lane.results.last == 3
 
 
-def test_a_step_from_an_earlier_frame_with_other_settings_tracks_it_anew(page, sample, act):
+def test_a_step_shows_what_was_tracked_whatever_the_settings_are_now(page, sample, act):
     state, controller = page
     started(state, controller, sample, act)
     act(lambda: controller.jump(3), lambda: controller.jump(0))
+    stored = state.lane.results.entry(1)
     state.change("n", 2)
     act(controller.step)
-    assert state.frame == state.lane.results.last == 1
-    assert len(state.entry.result.info.predicted) == 2
+    assert (state.frame, state.lane.results.last) == (1, 3)
+    assert state.entry is stored
 
 
 def test_the_same_frames_with_the_same_settings_are_the_same(page, sample, act):
@@ -147,17 +148,17 @@ def test_a_missing_file_is_one_sentence(page, sample, act, choice):
     assert not state.busy
 
 
-def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(page, sample, act):
+def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_jpeg(page, sample, act):
     state, controller = page
     started(state, controller, sample, act)
-    scenes = {name: scene(state.entry) for name, scene in SCENES.items()}
+    scenes = {name: scene(state.entry, ()) for name, scene in SCENES.items()}
     assert len(scenes["particles"].meshes) == 8
     assert len(scenes["reconstruction"].meshes) == 1
     assert scenes["trajectories"].lines[0].paths.shape[0] == 4 * 6
-    assert isinstance(view_of([state.entry], 0.1, 0.2, 1.5), ViewCamera)
+    assert isinstance(view_of([state.entry], state), ViewCamera)
     frame = state.session[0]
-    plain = depth_picture(frame)
-    full = depth_picture(frame, state.entry.seen, [(state.summary.joints, (255, 255, 255))])
+    plain = depth_jpeg(frame)
+    full = depth_jpeg(frame, state.entry.seen, [Skeleton(state.summary.joints, (255, 255, 255))])
     assert plain.startswith(b"\xff\xd8")
     assert plain != full
 
@@ -171,3 +172,45 @@ def test_clicks_that_come_faster_than_frames_are_all_done(page, sample, act):
 
     asyncio.run(three_at_once())
     assert state.frame == 3
+
+
+def test_looking_at_a_frame_tracks_nothing_and_stops_play(page, sample, act):
+    state, controller = page
+    started(state, controller, sample, act)
+    state.playing = True
+    controller.look(50)
+    assert (state.frame, state.playing, state.lane.results.last) == (50, False, 0)
+    act(lambda: controller.jump(2))
+    assert (state.frame, state.lane.results.last) == (2, 2)
+
+
+def test_who_looks_back_while_frames_are_tracked_is_left_where_he_looks(page, sample, act):
+    state, controller = page
+    started(state, controller, sample, act)
+
+    def look_back_at_two(event):
+        if event.new == 2:
+            controller.look(0)
+
+    watcher = state.param.watch(look_back_at_two, "frame")
+    act(lambda: controller.jump(4))
+    state.param.unwatch(watcher)
+    assert (state.frame, state.lane.results.last) == (0, 4)
+
+
+def test_play_in_a_loop_stays_within_the_range(page, sample, act):
+    state, controller = page
+    started(state, controller, sample, act)
+    act(lambda: controller.jump(4))
+    state.param.update(span=(1, 3), loop=True)
+    shown = []
+
+    async def drawn():
+        shown.append(state.frame)
+        if len(shown) == 7:
+            controller.pause()
+
+    controller.drawn = drawn
+    act(controller.play)
+    assert shown == [2, 3, 1, 2, 3, 1, 2]  # it began at 1
+    assert state.lane.results.last == 4

@@ -19,7 +19,7 @@ def entry(index, *, lost=False, size=10):
     result = TrackedFrame(
         index, index / 30, np.zeros(size), np.eye(3), joints, lost, False, 0.0, 2.0, 0.1, 0.9, 0.02, {}, None, None
     )
-    return Entry(result, (), None, None)
+    return Entry(result, (), None, None, ())
 
 
 def test_old_entries_go_before_memory_grows_and_their_summaries_stay():

@@ -33,7 +33,7 @@ def run(made, tmp_path_factory):
 def test_help_and_version(capsys):
     assert execute([]) == 0
     text = capsys.readouterr().out
-    for command in ("info", "convert", "synth", "calibrate", "track", "evaluate", "doctor"):
+    for command in ("info", "convert", "synth", "calibrate", "track", "evaluate", "report", "export", "doctor"):
         assert command in text
         assert execute([command, "--help"]) == 0
         assert "spf " + command in capsys.readouterr().out
@@ -130,6 +130,18 @@ def test_ctrl_c_keeps_what_is_tracked(tmp_path):
     kept = read_run(directory)
     assert kept.manifest["complete"] is False
     assert len(kept.track) == kept.manifest["frames_tracked"] < 200
+
+
+def test_report_and_export(run, tmp_path, capsys):
+    page, table = tmp_path / "run.html", tmp_path / "track.csv"
+    assert execute(["report", str(run), "-o", str(page)]) == 0
+    assert "open it in any browser" in capsys.readouterr().out
+    assert "http" not in page.read_text()
+    assert execute(["report", str(run), "-o", str(page)]) == 2
+    assert execute(["report", str(run), "-o", str(page), "--no-session", "--force"]) == 0
+    assert "Written without the session" in page.read_text()
+    assert execute(["export", str(run), "-o", str(table)]) == 0
+    assert len(table.read_text().splitlines()) == 11
 
 
 def test_doctor(monkeypatch, capsys):

@@ -1,0 +1,159 @@
+"""What a setting does to the frame shown, presets as files, undo, and the page's address: without a browser."""
+
+import asyncio
+
+import numpy as np
+import pytest
+
+from app.address import Address, Place, place_of
+from app.controller import Controller
+from app.lane import Lane
+from app.presets import Presets
+from app.preview import Previewer
+from app.reruns import Reruns
+from app.runner import Runner
+from app.server import bundled
+from app.shelf import Shelf
+from app.state import State
+from app.views.again_card import AgainCard
+from app.views.difference import Difference
+from app.views.landscape import LandscapeCard
+from app.views.runs_card import RunsCard
+from spf.errors import SettingError
+
+
+async def weighed(state):
+    """Wait until the preview is that of the present settings."""
+    while state.preview is None or state.preview.settings != state.lane.settings:
+        await asyncio.sleep(0.01)
+
+
+def test_a_moved_slider_is_seen_in_the_frame_shown_and_tracks_nothing(page, sample):
+    state, controller = page
+    previewer, card = Previewer(state), LandscapeCard(state)
+
+    async def scene():
+        await controller.open(sample)
+        state.change("rounds", 2)
+        await controller.start()
+        await controller.step()
+        await weighed(state)
+        before = state.lane.entry(1)
+        assert state.entry is before
+        state.change("h", 0.6)
+        state.change("k", 5.0)
+        await weighed(state)
+        return before
+
+    before = asyncio.run(asyncio.wait_for(scene(), 120))
+    now = state.entry.result.info
+    assert state.lane.entry(1) is before
+    assert state.lane.results.last == 1
+    assert now.window == 0.6
+    assert (now.cost_after != before.result.info.cost_after).all()
+    np.testing.assert_array_equal(now.optimised, before.result.info.optimised)
+    assert "ESS" in state.preview.note
+    card.draw()
+    assert card.image.data["cost"][0].shape == (19, 19)
+    assert len(card.samples.data["x"]) == len(now.predicted) + len(now.optimised) + 1
+    previewer.close()
+
+
+def test_what_cannot_be_seen_at_once_is_said(page, sample):
+    state, controller = page
+    previewer = Previewer(state)
+
+    async def scene():
+        await controller.open(sample)
+        state.change("rounds", 1)
+        await controller.start()
+        state.change("n", 9)
+        await weighed(state)
+
+    asyncio.run(asyncio.wait_for(scene(), 120))
+    assert "n: seen when the frame is tracked again" in state.preview.note
+    previewer.close()
+
+
+def test_a_preset_is_saved_as_a_file_and_read_back(tmp_path):
+    presets = Presets(tmp_path / "presets")
+    lane = Lane(presets=presets)
+    lane.change("k", 2.5)
+    presets.save("spf", "my hand", lane.settings)
+    assert presets.names("spf") == ["default", "paper", "my hand"]
+    assert presets.names("smd") == ["default", "paper"]
+    lane.preset = "my hand"
+    assert lane.settings.k == 2.5
+    assert lane.differences == {}
+    lane.tracker = "smd"
+    assert lane.preset == "default"
+
+
+@pytest.mark.parametrize("name", ["", "default", "../up", "a/b", "taken"])
+def test_no_preset_is_written_over_or_outside(tmp_path, name):
+    presets = Presets(tmp_path)
+    presets.save("spf", "taken", Lane().settings)
+    with pytest.raises(SettingError):
+        presets.save("spf", name, Lane().settings)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_a_damaged_preset_is_one_sentence(tmp_path):
+    (tmp_path / "odd.spf.json").write_text('{"format": "spf-preset"')
+    with pytest.raises(SettingError, match="damaged"):
+        Presets(tmp_path).settings("spf", "odd")
+
+
+def test_changes_are_undone_one_by_one_and_a_dragged_slider_is_one(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("app.lane.time.monotonic", lambda: now[0])
+    lane = Lane()
+    first = lane.settings
+    for value in (1.1, 1.2, 1.3):
+        now[0] += 0.1
+        lane.change("k", value)
+    lane.change("h", 2.0)
+    lane.undo()
+    assert (lane.settings.k, lane.settings.h) == (1.3, first.h)
+    lane.undo()
+    assert lane.settings == first
+    assert not lane.can_undo
+
+
+def test_an_address_is_read_and_what_is_odd_in_it_left_out():
+    whole = place_of({"session": "a", "run": "x,y", "frame": 7, "view": "compare", "eye": "0.1,0.2,2"})
+    assert whole == Place("a", "", ("x", "y"), 7, "compare", (0.1, 0.2, 2.0))
+    assert place_of({"frame": "-3", "view": "upside-down", "eye": "east"}) == Place()
+
+
+def test_an_address_opened_elsewhere_shows_the_same(page, sample, act, tmp_path):
+    state, controller = page
+    shelf = Shelf(tmp_path / "runs")
+    samples = bundled()
+    address = Address(state, controller, Reruns(controller, shelf), samples)
+    act(lambda: address.go(Place("open-close", frame=12)))
+    state.orbit(0.5, 0.0, 1.0)
+    query = address.query()
+    assert (query["session"], query["frame"], "run" in query) == ("open-close", 12, False)
+    other = State()
+    elsewhere = Controller(other, Runner())
+    act(lambda: Address(other, elsewhere, Reruns(elsewhere, shelf), samples).go(place_of(query)))
+    assert (other.session.name, other.frame, other.azimuth) == ("open-close", 12, 0.5)
+    elsewhere.close()
+
+
+def test_an_address_of_a_run_that_is_gone_says_so_and_shows_its_session(page, act, tmp_path):
+    state, controller = page
+    address = Address(state, controller, Reruns(controller, Shelf(tmp_path)), bundled())
+    act(lambda: address.go(Place("open-close", runs=("gone",))))
+    assert state.session.name == "open-close"
+    assert "gone" in state.error
+
+
+def test_cards_can_be_shown_before_anything_is_there(page, tmp_path):
+    state, controller = page
+    shelf = Shelf(tmp_path)
+    reruns = Reruns(controller, shelf)
+    assert AgainCard(state, reruns).panel is not None
+    assert RunsCard(state, shelf, reruns).panel is not None
+    Difference(state).draw()
