@@ -73,6 +73,7 @@ def page(server):
         page.on("request", lambda request: elsewhere.append(request.url) if _is_elsewhere(request.url) else None)
         page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.add_init_script("localStorage.setItem('spf-tour', localStorage.getItem('spf-tour') ?? 'seen')")
         page.goto(address)
         picture(page, "Depth image").wait_for()
         try:
