@@ -32,6 +32,7 @@ from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
 from app.views.start_card import StartCard
 from app.views.status import Status
+from app.views.tour import Tour
 from app.views.transport import Transport
 
 __all__ = ["page"]
@@ -70,7 +71,17 @@ def page() -> pmu.Page:
     runs = folded("Runs", lambda: [RunsCard(state, shelf, reruns).panel])
     export = folded("Export", lambda: [ExportCard(state, controller, renderer(), shelf.folder).panel])
     start = StartCard(state, controller.start)
-    main = [Transport(state, controller).panel, Messages(state).panel, modes.panel]
+    transport = Transport(state, controller)
+    parts = {
+        "session": session.panel, "start": start.panel, "transport": transport.panel, "settings": settings.panel,
+        "export": export,
+    }  # fmt: skip
+    tour = Tour(parts, width=0, height=0, margin=0)
+    again_tour = pmu.Button(
+        label="Tour", icon="explore", size="small", variant="text", color="default", margin=(8, 4), sx={"color": "white"},
+        on_click=lambda _event: tour.begin(),
+    )  # fmt: skip
+    main = [transport.panel, Messages(state).panel, modes.panel, tour]
     line = {"margin": (2, 10)}
     sidebar = [
         session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
@@ -96,7 +107,7 @@ def page() -> pmu.Page:
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
-        title=_TITLE, header=[modes.switch(controller.show_mode), Status(state, controller.cancel).panel],
+        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, controller.cancel).panel],
         main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip

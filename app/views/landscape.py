@@ -24,6 +24,7 @@ class LandscapeCard(Follower):
 
     def __init__(self, state: State) -> None:
         plot = calm_figure("", "", x_range=(-1, 1), y_range=(-1, 1))
+        plot.update(height=190, sizing_mode="stretch_width")  # among cards that take what room they need
         plot.grid.visible = False
         self.image = ColumnDataSource({"cost": [], "x": [], "y": [], "w": [], "h": []})
         self._mapper = LinearColorMapper(palette=_PALETTE)
@@ -36,7 +37,7 @@ class LandscapeCard(Follower):
         super().__init__(state, None, also=("lane", "rules"))
         self.figure = plot
         self._heading = pn.pane.HTML(heading("Cost E", *keys), margin=(2, 10), sizing_mode="stretch_width")
-        self._pane = pn.pane.Bokeh(plot, height=190, sizing_mode="stretch_width", margin=0)
+        self._pane = pn.pane.Bokeh(plot, height=190, min_height=190, sizing_mode="stretch_width", margin=0)
         self.note = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
         options = {name.replace("_", " "): index for index, name in enumerate(DOF_NAMES)}
         self._entries = [
