@@ -21,6 +21,7 @@ from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
 from app.views.again_card import AgainCard
+from app.views.export_card import ExportCard
 from app.views.fold import folded
 from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
@@ -31,6 +32,7 @@ from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
 from app.views.start_card import StartCard
 from app.views.status import Status
+from app.views.tour import Tour
 from app.views.transport import Transport
 
 __all__ = ["page"]
@@ -67,12 +69,23 @@ def page() -> pmu.Page:
     lanes, settings = LanesCard(state, controller), SettingsCard(state, presets)
     again, landscape = AgainCard(state, reruns), LandscapeCard(state)
     runs = folded("Runs", lambda: [RunsCard(state, shelf, reruns).panel])
+    export = folded("Export", lambda: [ExportCard(state, controller, renderer(), shelf.folder).panel])
     start = StartCard(state, controller.start)
-    main = [Transport(state, controller).panel, Messages(state).panel, modes.panel]
+    transport = Transport(state, controller)
+    parts = {
+        "session": session.panel, "start": start.panel, "transport": transport.panel, "settings": settings.panel,
+        "export": export,
+    }  # fmt: skip
+    tour = Tour(parts, width=0, height=0, margin=0)
+    again_tour = pmu.Button(
+        label="Tour", icon="explore", size="small", variant="text", color="default", margin=(8, 4), sx={"color": "white"},
+        on_click=lambda _event: tour.begin(),
+    )  # fmt: skip
+    main = [transport.panel, Messages(state).panel, modes.panel, tour]
     line = {"margin": (2, 10)}
     sidebar = [
         session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
-        landscape.panel, again.panel, pmu.Divider(**line), runs,
+        landscape.panel, again.panel, pmu.Divider(**line), runs, export,
     ]  # fmt: skip
 
     async def first() -> None:
@@ -94,7 +107,7 @@ def page() -> pmu.Page:
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
-        title=_TITLE, header=[modes.switch(controller.show_mode), Status(state, controller.cancel).panel],
+        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, controller.cancel).panel],
         main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip

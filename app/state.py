@@ -21,8 +21,8 @@ __all__ = ["COLOURS", "INITS", "MODES", "SHAPES", "State"]
 INITS = {"Find it automatically": "auto", "Take it from the truth": "truth", "Read a pose file": "file"}
 SHAPES = {"Calibrate it from the depth": "depth", "Read a hand file": "file"}
 
-#: What the page shows: one tracker with all its particles, or several beside each other.
-MODES = {"One tracker": "one", "Compare": "compare"}
+#: What the page shows: one tracker with all its particles, several beside each other, or the method explained.
+MODES = {"One tracker": "one", "Compare": "compare", "Help": "help"}
 
 #: Colours of the lanes, after Okabe and Ito: people of every colour vision can tell them apart.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7")

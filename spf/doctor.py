@@ -38,7 +38,11 @@ __all__ = [
 DISTRIBUTION = "smart-particle-filter"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 SENSORS = (("RealSense cameras", "pyrealsense2", "pyrealsense2 libusb-package"), ("OAK cameras", "depthai", "depthai"))
-SENSOR_LISTS = {"pyrealsense2": "realsense import list_realsense", "depthai": "oak import list_oak"}
+#: What makes ``found()``, the URIs of the cameras that a driver sees.
+SENSOR_LISTS = {
+    "pyrealsense2": "from spf.live.realsense import list_realsense as found",
+    "depthai": "from spf.live.oak import list_oak as found",
+}
 
 #: Compiles one function and compares it with Python's own answer.
 NUMBA_TRIAL = """
@@ -146,7 +150,7 @@ def check_sensors(timeout: float = 30.0) -> tuple[Check, ...]:
 
 
 def _cameras(name: str, module: str, timeout: float) -> Check:
-    program = f"from spf.live.{SENSOR_LISTS[module]} as found; print('\\n'.join(found()))"
+    program = f"{SENSOR_LISTS[module]}; print('\\n'.join(found()))"
     try:
         trial = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=timeout)
     except subprocess.TimeoutExpired:

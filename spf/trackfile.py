@@ -16,7 +16,7 @@ from spf.errors import RunError
 from spf.frame import JOINT_NAMES
 from spf.track import TrackedFrame
 
-__all__ = ["Track", "TrackRow", "read_track", "row_of", "rows_of", "track_of", "write_track"]
+__all__ = ["Track", "TrackRow", "read_track", "row_of", "rows_of", "table_of", "track_of", "write_track"]
 
 Array = NDArray[np.float64]
 
@@ -137,21 +137,26 @@ def rows_of(track: Track) -> list[TrackRow]:
     return rows
 
 
-def write_track(track: Track, path: Path) -> None:
-    """Write a track; a reader sees the old file or the whole new one, never a part.
-
-    Raises:
-        RunError: the file cannot be written.
-    """
+def table_of(track: Track) -> pa.Table:
+    """Return a track as a table with named columns, one row a frame."""
     columns: dict[str, Any] = {"frame": track.frame, "time": track.time}
     columns |= {"lost": track.lost, "recovered": track.recovered, "winner": track.winner.tolist()}
     columns |= {name: getattr(track, name) for name in _NUMBERS}
     columns |= {_POSE + name: track.poses[:, i] for i, name in enumerate(track.dof_names)}
     columns |= _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints)
     columns |= {_STAGE + stage: values for stage, values in track.timings.items()}
+    return pa.table(columns)
+
+
+def write_track(track: Track, path: Path) -> None:
+    """Write a track; a reader sees the old file or the whole new one, never a part.
+
+    Raises:
+        RunError: the file cannot be written.
+    """
     part = path.with_name(path.name + ".part")
     try:
-        pq.write_table(pa.table(columns), part)
+        pq.write_table(table_of(track), part)
         os.replace(part, path)
     except OSError as error:
         raise RunError(f"The track {path} cannot be written: {error.strerror or error}.") from None

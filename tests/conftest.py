@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import settings
+
+from spf.errors import RenderUnavailableError
+from spf.render import Renderer
 
 # No deadlines: a test says nothing about time. Derandomised: a red run is red again when it is repeated.
 settings.register_profile("spf", deadline=None, derandomize=True)
@@ -32,3 +36,14 @@ def data_dir() -> Path:
 def rng() -> np.random.Generator:
     """A generator with a fixed seed."""
     return np.random.default_rng(20070901)
+
+
+@pytest.fixture(scope="session")
+def renderer() -> Iterator[Renderer]:
+    """A renderer that the tests share; skips where nothing can draw."""
+    with Renderer() as shared:
+        try:
+            shared.opengl().result()
+        except RenderUnavailableError as error:
+            pytest.skip(str(error))
+        yield shared

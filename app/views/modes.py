@@ -1,4 +1,4 @@
-"""Which part of the page is seen: one tracker, or several compared; the second is made when it is first asked for."""
+"""Which part of the page is seen: one tracker, several compared, or the help; each is made when it is first asked for."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import panel_material_ui as pmu
 from app.state import MODES, State
 from app.views.comparison import Comparison
 from app.views.detail import Detail
+from app.views.help import Help
 from app.views.three_d import ThreeD
 from spf.render import Renderer
 
@@ -19,6 +20,7 @@ __all__ = ["Modes"]
 
 
 _A_MOMENT = 0.1  # s in which the browser says what it is about to do, for it then is busy
+_LAYING_OUT = {"compare": "Laying out the comparison", "help": "Opening the help"}
 _SWITCH = {
     "& .MuiToggleButton-root": {
         "color": "white", "borderColor": "rgba(255, 255, 255, 0.5)", "padding": "3px 12px", "whiteSpace": "nowrap",
@@ -34,9 +36,8 @@ class Modes:
 
     def __init__(self, state: State, renderer: Renderer) -> None:
         self._state, self._renderer = state, renderer
-        self._one = Detail(state, renderer)
-        self._several: Comparison | None = None
-        self.panel = pn.Column(self._one.panel, sizing_mode="stretch_width", margin=0)
+        self._parts: dict[str, Detail | Comparison | Help] = {"one": Detail(state, renderer)}
+        self.panel = pn.Column(self._parts["one"].panel, sizing_mode="stretch_width", margin=0)
         state.param.watch(self._follow, "mode")
 
     def switch(self, show: Callable[[str], Awaitable[None]]) -> pmu.RadioButtonGroup:
@@ -46,34 +47,37 @@ class Modes:
             show: shows a mode.
         """
         group = pmu.RadioButtonGroup(
-            options=MODES, value=self._state.mode, size="small", margin=(8, 16), width=190, sx=_SWITCH
+            options=MODES, value=self._state.mode, size="small", margin=(8, 16), width=250, sx=_SWITCH
         )
 
         async def picked(event: Any) -> None:
-            if event.new == "compare" and self._several is None:
-                self._state.preparing = "Laying out the comparison"
+            if event.new == self._state.mode:
+                return
+            if event.new not in self._parts:
+                self._state.preparing = _LAYING_OUT[event.new]
                 await asyncio.sleep(_A_MOMENT)
             await show(event.new)
             self._state.preparing = ""
 
         group.param.watch(picked, "value")
+        self._state.param.watch(lambda event: setattr(group, "value", event.new), "mode")
         return group
 
     @property
     def pictures(self) -> ThreeD:
         """The pictures that are seen."""
-        return self._one.pictures if self._several is None or self._state.mode == "one" else self._several.pictures
+        return self._parts[self._state.mode].pictures
 
     async def drawn(self) -> None:
         """Wait until the browser shows the latest frame."""
         await self.pictures.drawn()
 
     def _follow(self, *_events: Any) -> None:
-        several = self._state.mode == "compare"
-        if several and self._several is None:
-            self._several = Comparison(self._state, self._renderer)
-            self.panel.append(self._several.panel)
-        self._one.panel.visible = not several
-        if self._several is not None:
-            self._several.panel.visible = several
+        mode = self._state.mode
+        if mode not in self._parts:
+            made = Comparison if mode == "compare" else Help
+            self._parts[mode] = made(self._state, self._renderer)
+            self.panel.append(self._parts[mode].panel)
+        for name, part in self._parts.items():
+            part.panel.visible = name == mode
         self.pictures.request()

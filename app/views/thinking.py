@@ -19,7 +19,7 @@ from spf.render import Renderer
 
 __all__ = ["Thinking"]
 
-_PLANE_HEIGHT, _TABLE_HEIGHT, _DESCENT_HEIGHT, _FRAMES_HEIGHT = 440, 216, 440, 200
+_PLANE_HEIGHT, _TABLE_HEIGHT, _DESCENT_HEIGHT, _FRAMES_HEIGHT = 440, 240, 440, 200
 
 
 class Thinking:

@@ -16,48 +16,52 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.fuzz.case import read_recording
+from benchmarks.fuzz.recordings import RECORDINGS
 from benchmarks.fuzz.worker import Worker
-from tests.sessions.file_makers import FILE_MAKERS, make_hdf5
-from tests.sessions.makers import MAKERS
-from tests.sessions.ros_makers import ROS_MAKERS
-
-_RECORDINGS = {**MAKERS, **ROS_MAKERS, **FILE_MAKERS, "arrays-hdf5": make_hdf5}
 
 
 def main() -> int:
     """Run the cases and print a table; the exit code is 1 when anything is wrong."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fuzz", description=__doc__)
     parser.add_argument("--cases", type=int, default=700, help="cases of each format (700: more than 10 000 in all)")
-    parser.add_argument("--format", choices=sorted(_RECORDINGS), action="append", help="only these")
+    parser.add_argument("--format", choices=sorted(RECORDINGS), action="append", help="only these")
     parser.add_argument("--seed", type=int, default=0, help="of the first case")
     options = parser.parse_args()
-    wrong, total = [], 0
-    print(f"{'recording':<14}{'cases':>7}{'refused':>9}{'read':>7}{'wrong':>7}{'peak MB':>9}{'s':>7}")
+    names = options.format or sorted(RECORDINGS)
+    wrong: list[str] = []
+    print(f"{'recording':<14}{'cases':>7}{'refused':>9}{'read':>7}{'wrong':>7}{'peak MB':>9}{'slowest s':>11}")
     with tempfile.TemporaryDirectory(prefix="spf-fuzz-") as folder:
-        for name in options.format or sorted(_RECORDINGS):
-            good = _RECORDINGS[name](Path(folder) / name / "good", np.random.default_rng(0)).path
-            worker, counts, peak, begun = (
-                Worker(good, Path(folder) / "case"),
-                collections.Counter[str](),
-                0.0,
-                time.time(),
-            )
-            for seed in range(options.seed, options.seed + options.cases):
-                outcome, used = worker.run(seed)
-                counts[outcome.kind] += 1
-                peak = max(peak, used)
-                if outcome.kind == "WRONG":
-                    wrong.append(f"{name} seed {seed}: {outcome.text}")
-            worker.close()
-            total += options.cases
-            print(
-                f"{name:<14}{options.cases:>7}{counts['refused']:>9}{counts['read']:>7}{counts['WRONG']:>7}"
-                f"{peak / 2**20:>9.0f}{time.time() - begun:>7.0f}",
-                flush=True,
-            )
-    print(f"{total} cases, {len(wrong)} wrong")
+        for name in names:
+            wrong += _run(name, range(options.seed, options.seed + options.cases), Path(folder))
+    print(f"{len(names) * options.cases} cases, {len(wrong)} wrong")
     print("\n".join(wrong))
     return bool(wrong)
+
+
+def _run(name: str, seeds: range, folder: Path) -> list[str]:
+    """Run the cases of one format, print its row and return what was wrong."""
+    good = RECORDINGS[name](folder / name / "good", np.random.default_rng(0)).path
+    whole = read_recording(good, "no damage")
+    wrong = [] if whole.kind == "read" else [f"{name} without damage: {whole.text}"]
+    counts = collections.Counter[str]()
+    peak = slowest = 0.0
+    worker = Worker(good, folder / "case")
+    for seed in seeds:
+        begun = time.perf_counter()
+        outcome, used = worker.run(seed)
+        slowest = max(slowest, time.perf_counter() - begun)
+        peak = max(peak, used)
+        counts[outcome.kind] += 1
+        if outcome.kind == "WRONG":
+            wrong.append(f"{name} seed {seed}: {outcome.text}")
+    worker.close()
+    print(
+        f"{name:<14}{len(seeds):>7}{counts['refused']:>9}{counts['read']:>7}{counts['WRONG']:>7}"
+        f"{peak / 2**20:>9.0f}{slowest:>11.1f}",
+        flush=True,
+    )
+    return wrong
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from benchmarks.fuzz.damage import damaged
 from spf.errors import SessionError
 from spf.sessions import open_session
 
-__all__ = ["Outcome", "run_case"]
+__all__ = ["Outcome", "read_recording", "run_case"]
 
 _READ = 6  # frames of a session that opens
 
@@ -52,10 +52,16 @@ def run_case(good: Path, seed: int, work: Path) -> Outcome:
     else:
         name, content = damaged(rng, good.read_bytes())
         target.write_bytes(content)
-    return _read(target, name)
+    return read_recording(target, name)
 
 
-def _read(path: Path, name: str) -> Outcome:
+def read_recording(path: Path, name: str) -> Outcome:
+    """Open a recording and read some of its frames.
+
+    Args:
+        path: of the recording.
+        name: of its damage, for the text.
+    """
     try:
         with open_session(path) as session:
             refused = 0

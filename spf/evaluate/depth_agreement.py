@@ -16,7 +16,7 @@ from spf.kernels.render import project_vertices, rasterise
 from spf.locate import reach_of
 from spf.observation import Observation, camera_numbers, observe
 
-__all__ = ["Agreement", "agreement_with_depth", "surface_distances"]
+__all__ = ["Agreement", "agreement_with_depth", "beyond_wrist", "surface_distances"]
 
 Array = NDArray[np.float64]
 _TRUNCATION = 0.04  # m; only the overlap is used of what it enters
@@ -53,7 +53,7 @@ def agreement_with_depth(hand: Hand, pose: Array, reference: Array, frame: Frame
     wrist, axis = np.ascontiguousarray(posed.frames[0, :, 3]), np.ascontiguousarray(posed.frames[0, :, 2])
     overlap = _overlap(posed, faces, frame, observation, wrist, axis)
     points = observation.hand_points
-    points = points[~_beyond_wrist(points - wrist, axis)]
+    points = points[~beyond_wrist(points - wrist, axis)]
     if not len(points):
         return Agreement(overlap, float("nan"))
     chosen = points[:: -(-len(points) // _POINTS)]
@@ -83,7 +83,7 @@ def _without_arm(hand: Hand) -> NDArray[np.int32]:
     return np.ascontiguousarray(hand.faces[(hand.skin.vertices[hand.faces, 2] < wrist).any(axis=1)])
 
 
-def _beyond_wrist(offsets: Array, axis: Array) -> NDArray[np.bool_]:
+def beyond_wrist(offsets: Array, axis: Array) -> NDArray[np.bool_]:
     """Which points, at (M, 3) from the wrist, are forearm; as :func:`spf.kernels.golden.beyond_wrist` for one."""
     along = offsets @ axis
     across = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))

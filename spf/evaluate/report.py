@@ -20,20 +20,32 @@ from spf.runs import Run
 from spf.sessions import Session
 from spf.trackfile import Track
 
-__all__ = ["evaluate_run"]
+__all__ = ["Compared", "compare_run", "evaluate_run", "measures_of"]
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 _GOOD_IOU = 0.6
 
 
-class _Compared(NamedTuple):
-    """What comparing every frame gives: (N, 21, 3) true and corrected joints, (N,) agreement with the depth."""
+class Compared(NamedTuple):
+    """What comparing every frame of a run gives.
+
+    Attributes:
+        truth: (N, 21, 3) m, true joints; NaN where unknown.
+        corrected: (N, 21, 3) m, the run's joints where the data set would mark them.
+        iou: (N,) overlap of the silhouettes; NaN while the hand is lost.
+        distance: (N,) m, mean distance of the observed points from the model; NaN while the hand is lost.
+    """
 
     truth: Array
     corrected: Array
     iou: Array
     distance: Array
+
+    @property
+    def errors(self) -> Array:
+        """(N, 21) m, distances of the corrected joints from the true ones; NaN where there is no truth."""
+        return joint_errors(self.corrected, self.truth)
 
 
 def evaluate_run(run: Run, session: Session, progress: Progress | None = None) -> dict[str, Any]:
@@ -52,32 +64,48 @@ def evaluate_run(run: Run, session: Session, progress: Progress | None = None) -
     Raises:
         SessionError: a frame cannot be read.
     """
+    return measures_of(run, session, compare_run(run, session, progress))
+
+
+def measures_of(run: Run, session: Session, compared: Compared) -> dict[str, Any]:
+    """Summarise a compared run; see :func:`evaluate_run`."""
     offsets = offsets_of(session.joint_definition) if session.has_truth else None
-    compared = _compare(run, session, np.zeros((len(JOINT_NAMES), 3)) if offsets is None else offsets, progress)
     track = run.track
     report: dict[str, Any] = {"session": session.name, "tracker": run.plan.tracker, "preset": run.plan.preset}
     report |= {"seed": run.plan.seed, "complete": run.manifest["complete"], "doubt": run.plan.start.doubt}
     report |= {"frames": len(track)}
     if session.has_truth:
         raw = measure_joints(joint_errors(track.joints, compared.truth))
-        corrected = measure_joints(joint_errors(compared.corrected, compared.truth))
+        corrected = measure_joints(compared.errors)
         report |= _joints_part(raw, corrected) | {"correction": _correction_note(session, offsets)}
     return _plain(report | _depth_part(compared) | _losses_part(track) | _work_part(track))
 
 
-def _compare(run: Run, session: Session, offsets: Array, progress: Progress | None) -> _Compared:
-    track, shape = run.track, run.plan.start.shape
-    hand = shape.hand()
-    result = _Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (), ())))
+def compare_run(run: Run, session: Session, progress: Progress | None = None) -> Compared:
+    """Compare every frame of a run with its depth, and with its truth where there is one.
+
+    Args:
+        run: track and plan.
+        session: that was tracked.
+        progress: called with what is being done and the share done.
+
+    Raises:
+        SessionError: a frame cannot be read.
+    """
+    known = offsets_of(session.joint_definition) if session.has_truth else None
+    offsets = np.zeros((len(JOINT_NAMES), 3)) if known is None else known
+    track, found = run.track, run.plan.start.shape
+    hand = found.hand()
+    result = Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (), ())))
     for row, index in enumerate(track.frame):
         frame = session[int(index)]
         posed = pose_hand(hand, track.poses[row], track.references[row])
-        result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), shape.lens)
+        result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), found.lens)
         if frame.truth is not None:
             result.truth[row] = frame.truth.joints
         if not track.lost[row]:
             result.iou[row], result.distance[row] = agreement_with_depth(
-                hand, track.poses[row], track.references[row], seen_through(frame, shape.lens)
+                hand, track.poses[row], track.references[row], seen_through(frame, found.lens)
             )
         if progress is not None:
             progress("Comparing with the depth", (row + 1) / len(track))
@@ -111,7 +139,7 @@ def _correction_note(session: Session, offsets: Array | None) -> str:
     return f"one constant offset a joint in its bone's frame, fitted once for {session.joint_definition}"
 
 
-def _depth_part(compared: _Compared) -> dict[str, Any]:
+def _depth_part(compared: Compared) -> dict[str, Any]:
     held = np.isfinite(compared.iou)
     return {
         "mean_data_to_model_mm": _mean(compared.distance) * 1e3,

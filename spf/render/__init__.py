@@ -1,5 +1,6 @@
 """Off-screen three-dimensional pictures: immutable scenes in, pixels out. All of PyVista and VTK is behind this."""
 
+from spf.render.depth_image import Box, Skeleton, box_around, depth_picture
 from spf.render.process import UNAVAILABLE, probe_opengl
 from spf.render.protocol import OpenGL
 from spf.render.renderer import Renderer
@@ -9,6 +10,7 @@ from spf.render.view import ViewCamera
 
 __all__ = [
     "UNAVAILABLE",
+    "Box",
     "Colour",
     "Lines",
     "Mesh",
@@ -16,7 +18,10 @@ __all__ = [
     "Points",
     "Renderer",
     "Scene",
+    "Skeleton",
     "ViewCamera",
+    "box_around",
+    "depth_picture",
     "particles_scene",
     "probe_opengl",
     "reconstruction_scene",

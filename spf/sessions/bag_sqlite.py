@@ -78,14 +78,14 @@ class SqliteBag(Bag):
                     query = "SELECT substr(data, 1, 16) FROM messages WHERE id = ?"
                     found = connection.execute(query, (row,)).fetchone()
                     yield found[0] if found and isinstance(found[0], bytes) else b""
-        except (sqlite3.Error, OverflowError) as error:
+        except (sqlite3.Error, ValueError, OverflowError) as error:
             raise damaged(self.path, str(error)) from error
 
     def _fetch(self, query: str, topic: str, position: int) -> bytes:
         try:
             with _connected(self.path) as connection:
                 row = connection.execute(query, (self._rows[topic][position][1],)).fetchone()
-        except (sqlite3.Error, OverflowError) as error:
+        except (sqlite3.Error, ValueError, OverflowError) as error:
             raise damaged(self.path, str(error)) from error
         if row is None or not isinstance(row[0], bytes):
             raise damaged(self.path, f"message {position} of {topic}")
@@ -101,7 +101,7 @@ def is_sqlite_bag(path: Path) -> bool:
         with _connected(path) as connection:
             query = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name IN ('messages', 'topics')"
             return bool(connection.execute(query).fetchone()[0] == 2)
-    except sqlite3.Error:
+    except (sqlite3.Error, ValueError):  # ValueError: what SQLite says of it is no text
         return True
 
 

@@ -109,6 +109,14 @@ def _records(file: BinaryIO, offset: int) -> Iterator[tuple[int, int, bytes]]:
         offset += _RECORD.size + length
 
 
+def _record_at(file: BinaryIO, offset: int) -> bytes:
+    """Return the content of the record at an offset; an index may name one behind the end."""
+    record = next(_records(file, offset), None)
+    if record is None:
+        raise ValueError(offset)
+    return record[2]
+
+
 def _stream(content: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(content))
 
@@ -137,7 +145,7 @@ def _from_summary(file: BinaryIO) -> McapIndex | None:
             for channel, time in _messages_of(file, chunk):
                 places[topics[channel]][time] = Place(chunk.chunk_start_offset, channel)
     entries = [MetadataIndex.read(_stream(content)) for opcode, content in records if opcode == Opcode.METADATA_INDEX]
-    found = [Metadata.read(_stream(next(_records(file, entry.offset))[2])) for entry in entries]
+    found = [Metadata.read(_stream(_record_at(file, entry.offset))) for entry in entries]
     return McapIndex(places, {record.name: record.metadata for record in found}, whole=True)
 
 
@@ -147,7 +155,7 @@ def _messages_of(file: BinaryIO, chunk: ChunkIndex) -> Iterator[tuple[int, int]]
         yield next(iter(chunk.message_index_offsets)), chunk.message_start_time
         return
     for offset in chunk.message_index_offsets.values():
-        index = MessageIndex.read(_stream(next(_records(file, offset))[2]))
+        index = MessageIndex.read(_stream(_record_at(file, offset)))
         yield from ((index.channel_id, time) for time, _ in index.records)
 
 

@@ -57,7 +57,11 @@ class RosSession(Session):
 
     def raw_depth(self, index: int) -> NDArray[np.uint16]:
         """Return the (H, W) raw counts of a frame."""
-        raw = _image(self.bag, self.topic, int(self.positions[index])).counts(self.depth_unit)
+        position = int(self.positions[index])
+        image = _image(self.bag, self.topic, position)
+        if image.pixels is None:  # damage to its encoding: the topic as a whole has depth
+            raise damaged(self.bag.path, f"image {position} of {self.topic}")
+        raw = image.counts(self.depth_unit)
         size = (self.camera.width, self.camera.height)
         if raw.shape[::-1] != size:
             raise SessionError(

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import app.controller
-from app.views.depth import depth_picture
+from app.views.depth import depth_jpeg
 from app.views.scenes import SCENES, view_of
-from spf.render import ViewCamera
+from spf.render import Skeleton, ViewCamera
 
 
 def started(state, controller, sample, act):
@@ -148,7 +148,7 @@ def test_a_missing_file_is_one_sentence(page, sample, act, choice):
     assert not state.busy
 
 
-def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(page, sample, act):
+def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_jpeg(page, sample, act):
     state, controller = page
     started(state, controller, sample, act)
     scenes = {name: scene(state.entry, ()) for name, scene in SCENES.items()}
@@ -157,8 +157,8 @@ def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_picture(p
     assert scenes["trajectories"].lines[0].paths.shape[0] == 4 * 6
     assert isinstance(view_of([state.entry], state), ViewCamera)
     frame = state.session[0]
-    plain = depth_picture(frame)
-    full = depth_picture(frame, state.entry.seen, [(state.summary.joints, (255, 255, 255))])
+    plain = depth_jpeg(frame)
+    full = depth_jpeg(frame, state.entry.seen, [Skeleton(state.summary.joints, (255, 255, 255))])
     assert plain.startswith(b"\xff\xd8")
     assert plain != full
 

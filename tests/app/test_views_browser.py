@@ -10,6 +10,7 @@ from tests.app.test_browser import (  # the fixtures are used by name
     button,
     columns,
     page,
+    past_frame,
     picture,
     pixels,
     plotted,
@@ -132,7 +133,7 @@ def test_the_scene_has_layers_colours_views_and_residuals(page):
     settled(page)
     assert np.abs(pixels(page, "Scene") - seen["residuals"]).mean() < 1.0
     button(page, "Play").click()
-    at_frame(page, 6)
+    past_frame(page, 6)
     button(page, "Pause").click()
     button(page, "Play").wait_for()
     changed("played")

@@ -1,14 +1,16 @@
 """Whatever is wrong with the input: one sentence on stderr that says so, an exit code, and no traceback."""
 
 import json
+import shutil
 
 import cv2
 import numpy as np
 import pytest
 
 from spf.cli import execute
-from spf.sessions import write_session
+from spf.sessions import open_session, write_session
 from spf.synthetic import SyntheticSettings, synthesise
+from tests.made_runs import kept_run
 
 POSE = {"format": "spf-pose", "side": "right", "pose": [0.0] * 26}
 CAMERA = {"fx": 224.5, "fy": 230.5, "cx": 160.0, "cy": 120.0}
@@ -30,6 +32,11 @@ def place(tmp_path_factory):
     write_session(
         synthesise(SyntheticSettings(frames=4, clutter="none", absent_from=0, absent_frames=4)), place / "empty.mcap"
     )
+    kept_run(open_session(place / "good.mcap"), place / "run")
+    shutil.copytree(place / "run", place / "moved")
+    manifest = json.loads((place / "run" / "manifest.json").read_text())
+    manifest["session"]["uri"] = str(place / "gone.mcap")
+    (place / "moved" / "manifest.json").write_text(json.dumps(manifest))
     (place / "torn.mcap").write_bytes((place / "good.mcap").read_bytes()[:300])
     (place / "nothing").mkdir()
     (place / "text.txt").write_text("hello")
@@ -87,6 +94,14 @@ CASES = {
     "unknown command": ("trak good.mcap", "No such command"),
     "unknown option": ("info good.mcap --loud", "--loud"),
     "no run": ("evaluate nothing", "is no run"),
+    "no run to report": ("report nothing -o new.html", "is no run"),
+    "report of another kind": ("report run -o new.pdf", "is an HTML file"),
+    "report of another session": ("report run -o new.html --session empty.mcap", "not the recording of this run"),
+    "report of a session that is gone": ("report run -o new.html --session gone.mcap", "no file or folder"),
+    "report without its session": ("report moved -o new.html", "--no-session"),
+    "export of another kind": ("export run -o new.txt", "ending says what is written"),
+    "export of a frame that is not there": ("export run -o new.png --frame 40", "was not tracked"),
+    "export of an unknown view": ("export run -o new.png --view below", "There is no view"),
     "no run to repeat": ("track --repeat nothing -o new", "is no run"),
     "repeat with changes": ("track --repeat nothing -o new --seed 3", "leave out --seed"),
     "no overwriting": ("convert good.mcap empty.mcap", "exists already"),

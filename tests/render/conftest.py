@@ -1,10 +1,8 @@
-"""A renderer that the tests share, a sphere to draw, and what to look for in a picture."""
+"""A sphere to draw, and what to look for in a picture."""
 
 import numpy as np
-import pytest
 
-from spf.errors import RenderUnavailableError
-from spf.render import Mesh, Renderer, ViewCamera
+from spf.render import Mesh, ViewCamera
 
 #: 0.2 m of the world fill the height of a picture, seen from half a metre.
 VIEW = ViewCamera((0.0, 0.0, 0.5), distance=0.5, extent=0.2)
@@ -40,13 +38,3 @@ def centre_of(picture):
     rows, columns = np.nonzero(drawn(picture))
     height, width = picture.shape[:2]
     return np.array([columns.mean() - (width - 1) / 2, rows.mean() - (height - 1) / 2]) * METRES_A_PIXEL
-
-
-@pytest.fixture(scope="session")
-def renderer():
-    with Renderer() as shared:
-        try:
-            shared.opengl().result()
-        except RenderUnavailableError as error:
-            pytest.skip(str(error))
-        yield shared
