@@ -27,6 +27,7 @@ from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
 from app.views.messages import Messages
 from app.views.modes import Modes
+from app.views.names import Names
 from app.views.runs_card import RunsCard
 from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
@@ -81,7 +82,7 @@ def page() -> pmu.Page:
         label="Tour", icon="explore", size="small", variant="text", color="default", margin=(8, 4), sx={"color": "white"},
         on_click=lambda _event: tour.begin(),
     )  # fmt: skip
-    main = [transport.panel, Messages(state).panel, modes.panel, tour]
+    main = [transport.panel, Messages(state).panel, modes.panel, tour, Names(width=0, height=0, margin=0)]
     line = {"margin": (2, 10)}
     sidebar = [
         session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,

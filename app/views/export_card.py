@@ -68,7 +68,7 @@ class ExportCard:
         for button in self._buttons:
             button.disabled = state.busy or not count
         told = (
-            f"The {count} frames of {state.lane.title}."
+            f"Of {state.lane.title}, frames tracked: {count}."
             if count
             else "Track some frames first: press Start, then Play."
         )

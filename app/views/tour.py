@@ -31,6 +31,7 @@ STEPS = (
 )  # fmt: skip
 
 _FRAME = {"outline": "3px solid #e69f00", "outline-offset": "-3px", "border-radius": "6px"}
+_NO_FRAME = {"outline": "none"}  # said, for a style that is left out stays in the browser
 
 
 class Tour(JSComponent):
@@ -115,4 +116,4 @@ class Tour(JSComponent):
         step = int(msg["step"])
         framed = STEPS[step].part if 0 <= step < len(STEPS) else ""
         for name, panel in self._parts.items():
-            panel.styles = _FRAME if name == framed else {}
+            panel.styles = _FRAME if name == framed else _NO_FRAME

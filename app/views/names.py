@@ -1,0 +1,49 @@
+"""Names for what the widget library leaves without one, so that a screen reader can say what it is."""
+
+from __future__ import annotations
+
+from panel.custom import JSComponent
+
+__all__ = ["Names"]
+
+
+class Names(JSComponent):
+    """Takes no room. Looks through the page whenever it changes, and names progress bars, hints and the buttons of numbers.
+
+    Panel's Material widgets draw these without a role or a name (axe-core: aria-progressbar-name, aria-prohibited-attr,
+    button-name), and have no parameter for it.
+    """
+
+    _esm = """
+    const RULES = [
+      ['[role=progressbar]:not([aria-label])', (it) => it.setAttribute('aria-label', 'Progress')],
+      ['span[aria-label]:not([role])', (it) => it.setAttribute('role', 'img')],
+      ['.MuiInputAdornment-root button:not([aria-label])', (it) => {
+        const label = it.closest('.MuiFormControl-root')?.querySelector('label')?.textContent ?? 'Number';
+        const less = it.closest('.MuiInputAdornment-positionStart');
+        it.setAttribute('aria-label', `${label.replace('*', '').trim()}: ${less ? 'less' : 'more'}`);
+      }],
+    ];
+
+    export function render({ model }) {
+      const watched = new WeakSet();
+      let waiting = false;
+      const soon = () => {
+        if (waiting) return;
+        waiting = true;
+        setTimeout(() => { waiting = false; look(document); }, 300);
+      };
+      const observer = new MutationObserver(soon);
+      const look = (root) => {
+        if (!watched.has(root)) {
+          watched.add(root);
+          observer.observe(root, { childList: true, subtree: true });
+        }
+        for (const [selector, name] of RULES) root.querySelectorAll(selector).forEach(name);
+        for (const it of root.querySelectorAll('*')) if (it.shadowRoot) look(it.shadowRoot);
+      };
+      look(document);
+      model.on('remove', () => observer.disconnect());
+      return document.createElement('span');
+    }
+    """
