@@ -73,15 +73,16 @@ class Controller:
             if not uri.strip():
                 raise StartError("Type the path of a session first: a file or a folder.")
             session = await self.run(lambda _report: self.opener(uri.strip(), camera.strip() or None))
-            await self.keeper.keep()
-            self.state.load(session, camera.strip())
+            if await self.keeper.keep():
+                self.state.load(session, camera.strip())
 
     async def start(self) -> None:
         """Find the first pose as chosen and track the first frame."""
         self.cancel()
         async with self.doing("Finding the first pose") as wanted:
             origin = await self.run(self._preparation())
-            await self.keeper.keep()
+            if not await self.keeper.keep():
+                return
             self.state.begin(origin)
             await self._advance(wanted)
 
@@ -209,7 +210,8 @@ class Controller:
             return
         self.cancel()
         async with self.doing("") as wanted:
-            await self.keeper.keep()
+            if not await self.keeper.keep():
+                return
             state.rewind()
             await self._advance(wanted)
 

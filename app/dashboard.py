@@ -39,17 +39,27 @@ from app.views.transport import Transport
 __all__ = ["page"]
 
 _TITLE = "Smart Particle Filter"
-_THEME = {
-    "palette": {"primary": {"main": "#1f4e79"}},
-    "typography": {"fontSize": 13},
-    "components": {"MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}}},
-}
+_BLUE, _LIGHT_BLUE = "#1f4e79", "#8ab8e0"  # links and sliders have to be seen on a light and on a dark page
+
+
+def _theme(primary: str) -> dict[str, Any]:
+    return {
+        "palette": {"primary": {"main": primary}},
+        "typography": {"fontSize": 13},
+        "components": {
+            "MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}},
+            "MuiAppBar": {"styleOverrides": {"root": {"backgroundColor": f"{_BLUE} !important", "color": "white"}}},
+        },
+    }
+
+
+_THEME = {"light": _theme(_BLUE), "dark": _theme(_LIGHT_BLUE)}
 _LOOK = 0.5  # s between two looks at the server's kernels
 
 
 def page() -> pmu.Page:
     """Build the page of one visitor."""
-    pn.extension()
+    pn.extension("tabulator")
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
     shelf, presets = Shelf(), Presets()

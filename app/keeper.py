@@ -51,16 +51,21 @@ class Keeper:
         await asyncio.sleep(_SOON)
         await self.keep()
 
-    async def keep(self) -> None:
-        """Write what is not on disk yet."""
+    async def keep(self) -> bool:
+        """Write what is not on disk yet.
+
+        Returns:
+            Whether it could be: else the state's error says why, and what was tracked is not to be dropped.
+        """
         async with self._lock:
             for job in self._jobs():
                 try:
                     await asyncio.to_thread(job)
                 except SpfError as error:
                     self._state.error = str(error)
-                    return
+                    return False
                 self._state.shelf += 1
+        return True
 
     def close(self) -> None:
         """Write what is not on disk yet, at once: the page is gone."""

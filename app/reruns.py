@@ -50,9 +50,8 @@ class Reruns:
         begin = max(frame if frame is not None else first, first)
         if begin > goal:
             return
-        await self._ready(lane, begin)
-        if lane.results.state(begin - 1) is None and begin > first:
-            return  # cancelled, and it was said
+        if not await self._ready(lane, begin):
+            return
         self._begin_again(lane, begin)
         state.show(begin)
         await self._controller.reach(range(begin, goal + 1), [lane])
@@ -67,7 +66,8 @@ class Reruns:
             return
         self._controller.cancel()
         lane = state.lane
-        await self._ready(lane, frame)
+        if not await self._ready(lane, frame):
+            return
         self._begin_again(lane, frame)
         await self._controller.once_more(frame, lane, other_seed=other_seed)
 
@@ -77,13 +77,17 @@ class Reruns:
         lane.results.cut(frame)
         lane.fork()
 
-    async def _ready(self, lane: Lane, frame: int) -> None:
-        """Keep what there is, and have the state before a frame in memory."""
-        await self._controller.keeper.keep()
+    async def _ready(self, lane: Lane, frame: int) -> bool:
+        """Keep what there is, and have the state before a frame in memory; False when that failed or was cancelled."""
+        if not await self._controller.keeper.keep():
+            return False
         state = self._state
         assert state.origin is not None
-        if frame > lane.begins(state.origin) and lane.results.state(frame - 1) is None:
+        if frame == lane.begins(state.origin):
+            return True
+        if lane.results.state(frame - 1) is None:
             await self._recall([lane], frame - 1)
+        return lane.results.state(frame - 1) is not None
 
     # ---- runs from disk
 
@@ -97,7 +101,8 @@ class Reruns:
         """
         state, controller = self._state, self._controller
         controller.cancel()
-        await controller.keeper.keep()
+        if not await controller.keeper.keep():
+            return
         async with controller.doing("Opening the run"):
             session, work = await self._session_of(run)
             if session is not state.session:

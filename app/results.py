@@ -17,7 +17,6 @@ from spf.trackfile import TrackRow, row_of
 
 __all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules"]
 
-PATH_POSES = 26  # poses kept of a trajectory of SMD: enough to draw it
 KEYFRAME = 10  # every so many frames, the state is kept for good
 MEMORY = 128 * 2**20  # bytes of entries that one lane of a page keeps
 
@@ -64,6 +63,9 @@ class Summary(NamedTuple):
         lost: whether the hand is lost.
         recovered: whether it was found again in this frame.
         ess: effective sample size, nan while lost.
+        optimised_share: weight of the optimised samples, nan while lost.
+        resampled: whether the particles were resampled; False where that is not known, in a run from disk.
+        winner: proposal of the heaviest particle; "" while lost.
         golden, overlap: how well the render explains the depth, nan while lost.
         error: mean distance of the joints from the truth, m; nan where there is no truth.
         seconds: spent on the frame.
@@ -75,6 +77,9 @@ class Summary(NamedTuple):
     lost: bool
     recovered: bool
     ess: float
+    optimised_share: float
+    resampled: bool
+    winner: str
     golden: float
     overlap: float
     error: float
@@ -103,7 +108,7 @@ class Results:
         for done, row in enumerate(rows, 1):
             index = row.result.index
             results._rows[index] = row
-            results._summaries[index] = _summary_of(row.result, session[index], tracking(index))
+            results._summaries[index] = _summary_of(row, session[index], tracking(index), resampled=False)
             report("Opening the run", done / len(rows))
         results._states = dict(states)
         return results
@@ -112,10 +117,11 @@ class Results:
         """Store a frame; whatever was tracked after it no longer follows from it and is dropped."""
         index = entry.result.index
         self.cut(index)
-        self._rows[index] = row_of(entry.result)
+        row, info = row_of(entry.result), entry.result.info
+        self._rows[index] = row
         if index % KEYFRAME == 0:
             self._states[index] = entry.state
-        self._summaries[index] = _summary_of(entry.result, frame, entry.tracking)
+        self._summaries[index] = _summary_of(row, frame, entry.tracking, resampled=info is not None and info.resampled)
         self.recall(entry)
 
     def recall(self, entry: Entry) -> None:
@@ -194,18 +200,19 @@ def joint_error(joints: NDArray[np.float64], frame: Frame) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def _summary_of(result: TrackedFrame, frame: Frame, tracking: Tracking) -> Summary:
+def _summary_of(row: TrackRow, frame: Frame, tracking: Tracking, *, resampled: bool) -> Summary:
+    result = row.result
     return Summary(
-        result.index, result.joints, result.lost, result.recovered, result.ess, result.golden, result.overlap,
-        joint_error(result.joints, frame), result.seconds, tracking,
+        result.index, result.joints, result.lost, result.recovered, result.ess, row.optimised_share, resampled,
+        row.winner, result.golden, result.overlap, joint_error(result.joints, frame), result.seconds, tracking,
     )  # fmt: skip
 
 
 def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before: TrackState) -> Entry:
-    """Return what is kept of a frame: trajectories of at most PATH_POSES poses each, and what views show of the depth."""
+    """Return what is kept of a frame: trajectories in single precision, and what views show of the depth."""
     info, observation = result.info, result.observation
     if info is not None:
-        info = info._replace(trajectories=tuple(_thin(trace) for trace in info.trajectories))
+        info = info._replace(trajectories=tuple(_light(trace) for trace in info.trajectories))
     seen = None
     if observation is not None:
         points = observation.hand_points.astype(np.float32)
@@ -213,10 +220,8 @@ def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before
     return Entry(result._replace(info=info, observation=None), state, tracking, seen, before)
 
 
-def _thin(trace: Trajectory) -> Trajectory:
-    count = len(trace.poses)
-    kept = np.unique(np.linspace(0, count - 1, min(count, PATH_POSES)).round().astype(np.intp))
-    return Trajectory(*(part[kept] for part in trace))
+def _light(trace: Trajectory) -> Trajectory:
+    return Trajectory(*(part.astype(np.float32) for part in trace))
 
 
 def same_rules(tracking: Tracking, tracker: str, settings: Settings) -> bool:

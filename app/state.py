@@ -7,6 +7,7 @@ from typing import Any
 import param
 
 from app.lane import Lane, Origin
+from app.look import Look
 from app.results import Entry, Summary
 from spf.errors import SettingError
 from spf.initialise import Doubted
@@ -82,6 +83,7 @@ class State(param.Parameterized):
     def __init__(self, **params: Any) -> None:
         first = Lane(colour=COLOURS[0])
         super().__init__(lanes=(first,), lane=first, **params)
+        self.look = Look()
         self._watch_lane(first)
 
     # ---- lanes
@@ -155,7 +157,7 @@ class State(param.Parameterized):
             lane.clear()
         start = origin.start
         doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
-        warning = " ".join(text for text in (doubt, available_network()[1]) if text)
+        warning = " ".join(text for text in (doubt, start.remark, available_network()[1]) if text)
         self.param.update(
             origin=origin, frame=start.frame, error="", warning=warning, revision=self.revision + 1
         )  # fmt: skip
@@ -233,3 +235,4 @@ class State(param.Parameterized):
     def reset_view(self) -> None:
         """Look from where the sensor is."""
         self.param.update(azimuth=0.0, elevation=0.0, zoom=1.0)
+        self.look.pan = (0.0, 0.0)

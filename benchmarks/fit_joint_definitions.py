@@ -26,6 +26,7 @@ from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
 from spf.joint_definitions import corrected_joints, definitions, relative_offsets
+from spf.lens import as_stated
 from spf.manifest import Plan
 from spf.prepare import prepare
 from spf.runs import MANIFEST, read_run, reopen_session, track_plan
@@ -42,6 +43,7 @@ _STORED = Path(__file__).resolve().parent.parent / "spf" / "joint_definitions.js
 class _Tracked(NamedTuple):
     session: Session
     hand: Hand
+    lens: float
     track: Track
 
 
@@ -82,14 +84,17 @@ def main(arguments: list[str] | None = None) -> None:
 def _tracked(source: Path, seed: int, init: str) -> _Tracked:
     if (source / MANIFEST).exists():
         run = read_run(source)
-        return _Tracked(reopen_session(run.manifest), run.plan.start.shape.hand(), run.track)
+        shape = run.plan.start.shape
+        return _Tracked(reopen_session(run.manifest), shape.hand(), shape.lens, run.track)
     session = open_session(source)
     start = prepare(session, init=init, seed=seed)
     if start.doubt:
         print(f"{session.name}: {start.doubt}", file=sys.stderr)
     plan = Plan("spf", "default", make_settings("spf"), seed, init, 0, len(session), start)
     hand = start.shape.hand()
-    return _Tracked(session, hand, track_of([row_of(r) for r in track_plan(session, plan)], hand.dof_names))
+    return _Tracked(
+        session, hand, start.shape.lens, track_of([row_of(r) for r in track_plan(session, plan)], hand.dof_names)
+    )
 
 
 def _offsets(item: _Tracked) -> Array:
@@ -100,7 +105,7 @@ def _offsets(item: _Tracked) -> Array:
         truth = item.session.truth(int(item.track.frame[row]))
         if truth is not None:
             posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
-            result[place] = relative_offsets(item.hand, posed, truth.joints)
+            result[place] = relative_offsets(item.hand, posed, truth.joints / as_stated(np.ones(3), item.lens))
     return result
 
 
@@ -125,7 +130,8 @@ def _errors(item: _Tracked, offsets: Array) -> Array:
         truth = item.session.truth(int(index))
         if truth is not None:
             posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
-            result[row] = np.linalg.norm(corrected_joints(item.hand, posed, offsets) - truth.joints, axis=1)
+            joints = as_stated(corrected_joints(item.hand, posed, offsets), item.lens)
+            result[row] = np.linalg.norm(joints - truth.joints, axis=1)
     return result
 
 

@@ -38,6 +38,11 @@ __all__ = [
 DISTRIBUTION = "smart-particle-filter"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 SENSORS = (("RealSense cameras", "pyrealsense2", "pyrealsense2 libusb-package"), ("OAK cameras", "depthai", "depthai"))
+#: What makes ``found()``, the URIs of the cameras that a driver sees.
+SENSOR_LISTS = {
+    "pyrealsense2": "from spf.live.realsense import list_realsense as found",
+    "depthai": "from spf.live.oak import list_oak as found",
+}
 
 #: Compiles one function and compares it with Python's own answer.
 NUMBA_TRIAL = """
@@ -128,14 +133,33 @@ def check_browser() -> Check:
     return Check("Browser for tests", True, path)
 
 
-def check_sensors() -> tuple[Check, ...]:
-    """Return one check a family of live sensors; they are optional."""
+def check_sensors(timeout: float = 30.0) -> tuple[Check, ...]:
+    """Return one check a family of live sensors: whether its package is there, and which cameras it sees; all optional.
+
+    Drivers are asked in a child process, which they may crash.
+
+    Args:
+        timeout: seconds.
+    """
     return tuple(
-        Check(name, True, f"{module} is installed")
+        _cameras(name, module, timeout)
         if importlib.util.find_spec(module)
         else Check(name, True, "not installed", f"only for live capture: uv pip install {packages}")
         for name, module, packages in SENSORS
     )
+
+
+def _cameras(name: str, module: str, timeout: float) -> Check:
+    program = f"{SENSOR_LISTS[module]}; print('\\n'.join(found()))"
+    try:
+        trial = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=timeout)
+    except subprocess.TimeoutExpired:
+        return Check(name, True, f"{module} did not answer within {timeout:g} s", "unplug the cameras and plug them in")
+    if trial.returncode != 0:
+        last = (trial.stderr.strip() or f"exit code {trial.returncode}").splitlines()[-1]
+        return Check(name, True, f"{module} fails: {last}", "reinstall it; live capture with it does not work")
+    found = [line for line in trial.stdout.splitlines() if ":?serial=" in line]
+    return Check(name, True, f"{module} is installed; connected: {'; '.join(found) or 'none'}")
 
 
 def check_sessions(folder: Path | None = None) -> Check:

@@ -5,6 +5,7 @@ __all__ = [
     "RenderError",
     "RenderUnavailableError",
     "RunError",
+    "SensorError",
     "SessionError",
     "SettingError",
     "SpfError",
@@ -18,6 +19,10 @@ class SpfError(Exception):
 
 class SessionError(SpfError):
     """A session cannot be opened, read or written."""
+
+
+class SensorError(SpfError):
+    """A live sensor is missing, busy, lost or may not be used; most of the time it can be connected to again."""
 
 
 class SettingError(SpfError, ValueError):

@@ -24,6 +24,7 @@ from spf.hand.model import Side
 from spf.hand.shape import HandShape
 from spf.hypotheses import Hypothesis, hypotheses_of
 from spf.learned.network import available_network
+from spf.lens import Through, is_believable, lens_of, lenses_for
 from spf.locate import reach_of, strangeness
 from spf.observation import Observation, observe
 from spf.search import SearchSettings, size_penalty
@@ -80,9 +81,29 @@ class Start(NamedTuple):
         }
         return sentences[self.doubted]
 
+    @property
+    def remark(self) -> str:
+        """One sentence on a camera that was not believed, or ""."""
+        lens = self.shape.lens
+        if lens == 1.0:
+            return ""
+        length = 100.0 * lens * self.shape.hand().length
+        return (
+            f"The stated focal length makes this hand {length:.0f} cm long: it is tracked as if that were {lens:.2f} times "
+            "as long, and its joints are given as the stated camera shows them; check the camera file."
+        )
+
 
 class _Followed(NamedTuple):
-    """A hypothesis that was tracked for some frames: its first frame, mean golden energy, lead over the other side."""
+    """A hypothesis that was tracked for some frames.
+
+    Attributes:
+        frame: the first of them.
+        shape, pose, reference: the hand there.
+        energy: mean golden energy, strangeness and unlikely sizes included.
+        margin: lead over the other side.
+        explained: mean golden energy of the calibrated hand.
+    """
 
     frame: int
     shape: HandShape
@@ -90,6 +111,7 @@ class _Followed(NamedTuple):
     reference: Array
     energy: float
     margin: float
+    explained: float = 1.0
 
 
 def find_start(
@@ -115,6 +137,7 @@ def find_start(
     report = progress or (lambda _text, _share: None)
     sides = (shape.side,) if shape else (side,) if side else _SIDES
     network, _ = available_network()
+    stated, frames = frames, Through(frames, shape.lens if shape else 1.0)
     best: _Followed | None = None
     for attempt, (index, thorough) in enumerate(_attempts(len(frames), network is not None)):
         if best is not None and (_clear(best) or (thorough and best.energy < DOUBTFUL) or index > _INSTANTS[-1]):
@@ -132,7 +155,8 @@ def find_start(
             "No frame shows anything of a hand's size; check the depth unit and the camera with 'spf info'."
         )
     if shape is None:
-        best = _calibrated(frames, best, rng, report)
+        best = _through_a_lens(stated, _calibrated(frames, best, rng, report), rng, report)
+        frames = Through(stated, best.shape.lens)
     index, pose, reference = _first_held(frames, best, rng)
     report("Ready", 1.0)
     return Start(index, pose, reference, best.shape, best.energy, best.margin)
@@ -238,4 +262,24 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
         pose = relative_to_camera(views[0].pose, views[0].reference)
     shape, views, energy = size_by_render(views, shape, rng)
     pose = relative_to_camera(views[0].pose, views[0].reference)
-    return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy))
+    return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy), explained=energy)
+
+
+def _through_a_lens(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator, report: Progress) -> _Followed:
+    """Calibrate a hand of an unbelievable size again through other lenses, and take the likeliest."""
+    length = start.shape.hand().length
+    if is_believable(length):
+        return start
+
+    def calibrated(lens: float) -> _Followed:
+        shape, pose = start.shape._replace(scale=start.shape.scale / lens, lens=lens), start.pose.copy()
+        pose[:2] /= lens
+        return _calibrated(Through(frames, lens), start._replace(shape=shape, pose=pose), rng, report)
+
+    tried = [start, *(calibrated(lens) for lens in lenses_for(length))]
+    lens = lens_of(
+        [one.shape.lens for one in tried],
+        [one.shape.hand().length for one in tried],
+        [one.explained for one in tried],
+    )
+    return start if lens == 1.0 else calibrated(lens)

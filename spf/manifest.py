@@ -20,7 +20,7 @@ from spf.sessions import Session
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
-__all__ = ["Change", "Plan", "manifest_of", "plan_of", "read_manifest", "write_manifest"]
+__all__ = ["Change", "Plan", "live_manifest_of", "manifest_of", "plan_of", "read_manifest", "write_manifest"]
 
 _FORMAT = "spf-run"
 _PACKAGES = ("numpy", "numba", "scipy", "opencv-python-headless")
@@ -72,6 +72,35 @@ def manifest_of(plan: Plan, session: Session, camera_file: Path | None, command:
     Raises:
         SessionError: a frame cannot be read (for the session's fingerprint).
     """
+    described: dict[str, Any] = {
+        "uri": str(Path(session.uri).resolve()),
+        "camera_file": None if camera_file is None else str(camera_file.resolve()),
+        "name": session.name,
+        "format": session.format,
+        "frames": len(session),
+        "fingerprint": session.fingerprint(),
+        "joint_definition": session.joint_definition,
+        "warnings": list(session.warnings),
+    }
+    return _manifest(plan, described, command)
+
+
+def live_manifest_of(plan: Plan, recording: Path, command: list[str]) -> dict[str, Any]:
+    """Describe a live run that begins, whose recording is not finished: it has no fingerprint and no length yet."""
+    described: dict[str, Any] = {
+        "uri": str(recording.resolve()),
+        "camera_file": None,
+        "name": recording.stem,
+        "format": "mcap",
+        "frames": None,
+        "fingerprint": None,
+        "joint_definition": "model",
+        "warnings": [],
+    }
+    return _manifest(plan, described, command)
+
+
+def _manifest(plan: Plan, session: dict[str, Any], command: list[str]) -> dict[str, Any]:
     start, (network, _) = plan.start, available_network()
     saved = SavedPose(start.shape.side, start.pose, start.reference, start.frame, start.shape)
     return {
@@ -82,16 +111,7 @@ def manifest_of(plan: Plan, session: Session, camera_file: Path | None, command:
         "created": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "complete": False,
         "frames_tracked": 0,
-        "session": {
-            "uri": str(Path(session.uri).resolve()),
-            "camera_file": None if camera_file is None else str(camera_file.resolve()),
-            "name": session.name,
-            "format": session.format,
-            "frames": len(session),
-            "fingerprint": session.fingerprint(),
-            "joint_definition": session.joint_definition,
-            "warnings": list(session.warnings),
-        },
+        "session": session,
         "tracker": plan.tracker,
         "preset": plan.preset,
         "settings": plan.settings.to_dict(),

@@ -21,6 +21,7 @@ from spf.hand.model import Hand, Side, load_hand
 from spf.hand.pose_file import read_pose
 from spf.hand.shape import HandShape
 from spf.initialise import Progress, Start, find_start
+from spf.lens import Through, seen_through
 from spf.locate import reach_of
 from spf.observation import observe
 from spf.sessions import Session
@@ -132,7 +133,7 @@ def _from_file(
     used = shape or saved.shape
     if used is None:
         used = find_start(frames[index - first :], rng, side=saved.side, progress=progress).shape
-    return _judged(frames[index - first], used, saved.pose, saved.reference, rng)
+    return _judged(seen_through(frames[index - first], used.lens), used, saved.pose, saved.reference, rng)
 
 
 def _from_truth(
@@ -144,10 +145,11 @@ def _from_truth(
     """Take the exact pose where the truth has one and the hand is the exact one, else fit a pose to the true joints."""
     if not session.has_truth:
         raise StartError(f"{session.name} has no ground truth to start from; use --init auto or a pose file.")
-    position = next((i for i, frame in enumerate(frames) if _shows_its_truth(frame)), None)
+    seen = Through(frames, 1.0 if shape is None else shape.lens)
+    position = next((i for i, frame in enumerate(seen) if _shows_its_truth(frame)), None)
     if position is None:
         raise StartError(f"None of the frames of {session.name} to track shows a hand with truth; use --init auto.")
-    frame = frames[position]
+    frame = seen[position]
     truth = frame.truth
     assert truth is not None
     if shape is None and truth.pose is not None and session.hand_shape is not None:

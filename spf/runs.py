@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
@@ -11,14 +11,16 @@ from spf.errors import RunError
 from spf.hand.kinematics import joints_of
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.sessions import Session, open_session
-from spf.track import TrackedFrame, begin, track_frame
+from spf.track import TrackedFrame, Tracking, TrackState, begin, run, track_frame
 from spf.trackfile import Track, TrackRow, read_track, row_of, track_of, write_track
 
 __all__ = [
     "MANIFEST",
+    "RECORDING",
     "TRACK",
     "Run",
     "RunWriter",
+    "begin_late",
     "check_same_session",
     "read_run",
     "reopen_session",
@@ -27,6 +29,7 @@ __all__ = [
 ]
 
 MANIFEST, TRACK = "manifest.json", "track.parquet"
+RECORDING = "session.mcap"  # of a live run, unless it is recorded elsewhere
 _SAVED_EVERY = 200  # frames that a killed program loses at most
 
 
@@ -44,14 +47,34 @@ class Run(NamedTuple):
     track: Track
 
 
-def track_plan(session: Session, plan: Plan) -> Iterator[TrackedFrame]:
+def begin_late(plan: Plan, frame: int, time: float) -> tuple[Tracking, TrackState]:
+    """Set up a run that begins some frames after its first pose: the hand has moved on, and is searched for.
+
+    Args:
+        plan: of the run.
+        frame, time: index and time (s) of the first frame that will be tracked.
+    """
+    tracking, state = begin(plan.tracker, plan.settings, plan.start, plan.seed, time=time)
+    return tracking, state._replace(lost=True, missing=max(frame - plan.start.frame, 0))
+
+
+def track_plan(session: Session, plan: Plan, frames: Sequence[int] | None = None) -> Iterator[TrackedFrame]:
     """Track the frames of a plan, lazily: stop asking and nothing more is computed.
 
     Frames before the first pose's are reported as lost, with that pose: no hand was believed in them.
 
+    Args:
+        session: to track.
+        plan: of the run.
+        frames: of a live run that is repeated: those that its tracker came to.
+
     Raises:
         SessionError: a frame cannot be read.
     """
+    if frames is not None:
+        late = begin_late(plan, frames[0], float(session.times[frames[0]]))
+        yield from run(*late, (session[index] for index in frames))
+        return
     began = float(session.times[plan.start.frame])
     tracking, state = begin(plan.tracker, plan.settings, plan.start, plan.seed, time=began)
     joints = joints_of(tracking.hand, plan.start.pose, plan.start.reference)
@@ -107,6 +130,10 @@ class RunWriter:
         if len(self._rows) % _SAVED_EVERY == 0:
             self._save(complete=False)
 
+    def describe(self, manifest: dict[str, Any]) -> None:
+        """Replace the manifest by one that knows more: that of a live run, once its recording is finished."""
+        self._manifest = {**manifest, "complete": False, "frames_tracked": len(self._rows)}
+
     def _save(self, *, complete: bool) -> None:
         self._manifest = save_run(self._directory, self._manifest, self.track, complete=complete)
 
@@ -144,7 +171,7 @@ def check_free(directory: Path, overwrite: bool) -> None:
     """
     if directory.exists() and not directory.is_dir():
         raise RunError(f"{directory} is a file: choose a directory for the run.")
-    if not directory.exists() or not any(directory.iterdir()):
+    if not directory.exists() or all(path.name == RECORDING for path in directory.iterdir()):
         return
     if not (directory / MANIFEST).exists():
         raise RunError(f"The directory {directory} holds other things than a run: choose a new one.")
@@ -187,7 +214,8 @@ def check_same_session(manifest: dict[str, Any], session: Session) -> None:
         RunError: it is another recording.
         SessionError: a frame cannot be read.
     """
-    if session.fingerprint() != manifest["session"]["fingerprint"]:
+    stored = manifest["session"]["fingerprint"]
+    if stored is not None and session.fingerprint() != stored:  # a live run that was killed has none
         raise RunError(
             f"{session.uri} is not the recording of this run (its fingerprint differs): give the right session."
         )

@@ -22,6 +22,7 @@ from spf.initialise import Start
 from spf.kernels.cost import Spheres
 from spf.learned.guesses import extent_of, guesses
 from spf.learned.network import Network, available_network
+from spf.lens import as_stated, seen_through
 from spf.locate import reach_of
 from spf.observation import Observation, Suggestion, observe
 from spf.parallel import map_threads
@@ -90,7 +91,8 @@ class TrackedFrame(NamedTuple):
         index, time: of the frame.
         pose: (D,) the estimate, relative to ``reference``; the last one known while the hand is lost.
         reference: (3, 3) R_ref.
-        joints: (21, 3) m.
+        joints: (21, 3) m, as the stated camera shows them: where the start doubted its focal length
+            (:mod:`spf.lens`), the pose is that of the corrected camera.
         lost: whether the hand is lost in this frame.
         recovered: whether it was found again in this frame.
         log_likelihood: of the estimate; nan while lost.
@@ -149,6 +151,8 @@ def track_frame(
         (state, result).
     """
     began = time.perf_counter()
+    lens = tracking.start.shape.lens
+    frame = seen_through(frame, lens)
     rng = np.random.default_rng([tracking.seed, frame.index])
     was_lost = state.lost
     if was_lost:
@@ -164,7 +168,7 @@ def track_frame(
         spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
     )  # fmt: skip
     new = _judged(tracking, state, filter_state, info)
-    joints = joints_of(tracking.hand, info.estimate, info.reference)
+    joints = as_stated(joints_of(tracking.hand, info.estimate, info.reference), lens)
     timings = {
         "search": searched - began,
         "observe": observed - searched,
@@ -236,6 +240,7 @@ def _judged(tracking: Tracking, state: TrackState, filter_state: State, info: St
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:
     nan = float("nan")
     joints = joints_of(tracking.hand, state.filter.estimate, state.filter.reference)
+    joints = as_stated(joints, tracking.start.shape.lens)
     seconds = time.perf_counter() - began
     return TrackedFrame(
         frame.index, frame.time, state.filter.estimate, state.filter.reference, joints, True, False,

@@ -37,6 +37,7 @@ class Track(NamedTuple):
         joints: (N, 21, 3) m, of the hand model.
         lost, recovered: (N,) whether the hand is lost in a frame, and whether it was found again in it.
         log_likelihood, ess, golden, overlap, optimised_share, evaluations: (N,) NaN where no filter step was made.
+        winner: (N,) proposal that the heaviest particle came from; "" where no filter step was made.
         seconds: (N,) spent on the frame; 0 for frames before the first pose, which no tracker looked at.
         dof_names: D names of the entries of a pose.
         timings: stage → (N,) seconds; NaN in frames without that stage.
@@ -55,6 +56,7 @@ class Track(NamedTuple):
     overlap: Array
     optimised_share: Array
     evaluations: Array
+    winner: NDArray[np.str_]
     seconds: Array
     dof_names: tuple[str, ...]
     timings: dict[str, Array]
@@ -69,11 +71,13 @@ class TrackRow(NamedTuple):
     Attributes:
         result: of the frame, its info and observation left out.
         optimised_share, evaluations: of its info; NaN where there is none.
+        winner: of its info; "" where there is none.
     """
 
     result: TrackedFrame
     optimised_share: float
     evaluations: float
+    winner: str = ""
 
 
 def row_of(result: TrackedFrame) -> TrackRow:
@@ -81,7 +85,7 @@ def row_of(result: TrackedFrame) -> TrackRow:
     bare = result._replace(info=None, observation=None)
     if result.info is None:
         return TrackRow(bare, float("nan"), float("nan"))
-    return TrackRow(bare, result.info.optimised_share, float(result.info.evaluations))
+    return TrackRow(bare, result.info.optimised_share, float(result.info.evaluations), result.info.winner)
 
 
 def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
@@ -108,6 +112,7 @@ def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
         overlap=numbers([result.overlap for result in results]),
         optimised_share=numbers([row.optimised_share for row in rows]),
         evaluations=numbers([row.evaluations for row in rows]),
+        winner=np.array([row.winner for row in rows], dtype=np.str_),
         seconds=numbers([result.seconds for result in results]),
         dof_names=dof_names,
         timings={stage: numbers([result.timings.get(stage, nan) for result in results]) for stage in stages},
@@ -126,14 +131,16 @@ def rows_of(track: Track) -> list[TrackRow]:
             int(track.frame[i]), float(track.time[i]), track.poses[i], track.references[i], track.joints[i],
             bool(track.lost[i]), bool(track.recovered[i]), likelihood, ess, golden, overlap, seconds, timings, None, None,
         )  # fmt: skip
-        rows.append(TrackRow(result, float(track.optimised_share[i]), float(track.evaluations[i])))
+        rows.append(
+            TrackRow(result, float(track.optimised_share[i]), float(track.evaluations[i]), str(track.winner[i]))
+        )
     return rows
 
 
 def table_of(track: Track) -> pa.Table:
     """Return a track as a table with named columns, one row a frame."""
     columns: dict[str, Any] = {"frame": track.frame, "time": track.time}
-    columns |= {"lost": track.lost, "recovered": track.recovered}
+    columns |= {"lost": track.lost, "recovered": track.recovered, "winner": track.winner.tolist()}
     columns |= {name: getattr(track, name) for name in _NUMBERS}
     columns |= {_POSE + name: track.poses[:, i] for i, name in enumerate(track.dof_names)}
     columns |= _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints)
@@ -192,6 +199,8 @@ def read_track(path: Path) -> Track:
         lost=found["lost"],
         recovered=found["recovered"],
         **{name: found[name] for name in _NUMBERS},
+        # Tracks that were written before proposals were counted have no such column.
+        winner=np.asarray(found.get("winner", [""] * len(table)), dtype=np.str_),
         dof_names=dof_names,
         timings={name.removeprefix(_STAGE): found[name] for name in found if name.startswith(_STAGE)},
     )

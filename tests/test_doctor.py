@@ -89,7 +89,19 @@ def test_optional_parts_that_are_there_are_named(monkeypatch):
     assert doctor.check_browser() == Check("Browser for tests", True, "/bin/chromium")
     realsense, oak = doctor.check_sensors()
     assert realsense.advice
-    assert oak == Check("OAK cameras", True, "depthai is installed")
+    assert oak.found.startswith("depthai is installed; connected: ")
+
+
+def test_cameras_that_are_connected_are_listed_and_drivers_that_crash_are_told(monkeypatch):
+    monkeypatch.setattr(doctor.importlib.util, "find_spec", lambda _: True)
+    listing = "found = lambda: ['a note of the driver', 'realsense:?serial=7 (D435)']"
+    crashing = "import os; os.abort()"
+    monkeypatch.setattr(doctor, "SENSOR_LISTS", {"pyrealsense2": listing, "depthai": crashing})
+    realsense, oak = doctor.check_sensors()
+    assert realsense.found == "pyrealsense2 is installed; connected: realsense:?serial=7 (D435)"
+    assert oak.ok
+    assert "depthai fails" in oak.found
+    assert "reinstall" in oak.advice
 
 
 def test_sample_sessions(tmp_path):

@@ -8,6 +8,7 @@ from typing import Any
 import panel as pn
 
 from app.lane import Lane
+from app.look import Shown
 from app.results import Entry
 from app.state import COLOURS, State
 from app.views.curves import ERROR, ESS, GOLDEN, MILLISECONDS, OVERLAP, Curves
@@ -77,7 +78,7 @@ def _heading(lane: Lane, frame: int) -> str:
     return heading(f"<span style='color:{lane.colour}'>■</span> {html.escape(lane.title)}{loss}")
 
 
-def _scene(colour: str, entry: Entry) -> Scene | None:
+def _scene(colour: str, entry: Entry, _shown: Shown) -> Scene | None:
     return reconstruction_of(entry, _pale(colour))
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import panel as pn
 import panel_material_ui as pmu
 
+from app.look import TABS
 from app.state import State
 from app.views.costs import Costs
 from app.views.curves import ERROR, ESS, Curves
@@ -13,23 +15,59 @@ from app.views.depth import Depth
 from app.views.fit import Fit
 from app.views.grid import card, cards
 from app.views.plots import BEFORE, heading
+from app.views.scene_tab import SceneTab
 from app.views.scenes import PICTURES, SCENES
+from app.views.thinking import Thinking
 from app.views.three_d import ThreeD
+from app.views.viewpoints import viewpoints
 from app.views.weights import Weights
 from spf.render import Renderer
 
-__all__ = ["Detail", "truth_switch"]
+__all__ = ["Detail", "Overview", "truth_switch"]
 
 _PICTURE_HEIGHT, _PLOT_HEIGHT = 268, 196
 
 
 class Detail:
-    """The part of the page that is seen in the mode of one tracker."""
+    """The part of the page that is seen in the mode of one tracker: tabs, each made when it is first asked for."""
+
+    def __init__(self, state: State, renderer: Renderer) -> None:
+        self._state, self._renderer = state, renderer
+        self._tabs: dict[str, Overview | Thinking | SceneTab] = {"overview": Overview(state, renderer)}
+        switch = pmu.RadioButtonGroup.from_param(
+            state.look.param.tab, name="", options=TABS, size="small", margin=(0, 8),
+            sx={"& .MuiToggleButton-root": {"textTransform": "none", "padding": "3px 14px", "whiteSpace": "nowrap"}},
+        )  # fmt: skip
+        head = pn.FlexBox(
+            switch, viewpoints(state), justify_content="space-between", align_items="center", sizing_mode="stretch_width",
+            margin=(0, 8, 4, 0),
+        )  # fmt: skip
+        self.panel = pn.Column(head, self._tabs["overview"].panel, sizing_mode="stretch_width", margin=0)
+        state.look.param.watch(self._follow, "tab")
+
+    @property
+    def pictures(self) -> ThreeD:
+        """The pictures of the tab that is seen."""
+        return self._tabs[self._state.look.tab].pictures
+
+    def _follow(self, *_events: Any) -> None:
+        tab = self._state.look.tab
+        if tab not in self._tabs:
+            made = Thinking if tab == "particles" else SceneTab
+            self._tabs[tab] = made(self._state, self._renderer)
+            self.panel.append(self._tabs[tab].panel)
+        for name, part in self._tabs.items():
+            part.panel.visible = name == tab
+        self.pictures.request()
+
+
+class Overview:
+    """The tab that is seen first."""
 
     def __init__(self, state: State, renderer: Renderer) -> None:
         self.pictures = ThreeD(
             state, renderer, "one", PICTURES, lambda: dict.fromkeys(PICTURES, state.lane),
-            lambda name, entry: SCENES[name](entry),
+            lambda name, entry, shown: SCENES[name](entry, shown.selected),
         )  # fmt: skip
         depth = Depth(state)
         keys = ("●", "white", "estimate"), ("●", BEFORE, "truth")

@@ -1,10 +1,10 @@
-"""What follows the state: drawn when something changed, seldom while playing, and only in the mode that it belongs to."""
+"""What follows the state: drawn when something changed, seldom while playing, and only while it is seen."""
 
 from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, ClassVar
 
 import panel as pn
 
@@ -12,7 +12,8 @@ from app.state import State
 
 __all__ = ["Follower"]
 
-_EVERY = 0.4  # s between two redraws while playing
+_EVERY = 0.6  # s between two redraws while playing
+_PICTURES_FIRST = 80  # ms that the plots leave to the pictures, which are looked at first
 
 
 class Follower(ABC):
@@ -22,14 +23,22 @@ class Follower(ABC):
         state: of the page.
         mode: of the page that it is seen in; None for both.
         also: parameters of the state that it is drawn after, besides what was tracked.
+        look: parameters of the look that it is drawn after, besides the tab.
     """
 
-    def __init__(self, state: State, mode: str | None = "one", also: tuple[str, ...] = ()) -> None:
+    #: Tab of the page of one tracker that it is seen in.
+    tab: ClassVar[str] = "overview"
+
+    def __init__(
+        self, state: State, mode: str | None = "one", also: tuple[str, ...] = (), look: tuple[str, ...] = ()
+    ) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
         state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
+        state.look.param.watch(self._follow, ["tab", *look])
 
     def _follow(self, *_events: Any) -> None:
-        if self._mode is not None and self.state.mode != self._mode:
+        hidden = self._mode == "one" and self.state.look.tab != self.tab
+        if self._mode is not None and (self.state.mode != self._mode or hidden):
             return
         now = time.monotonic()
         if self.state.playing and now - self._drawn < _EVERY:
@@ -39,7 +48,7 @@ class Follower(ABC):
         if document is None or document.session_context is None:
             self.draw()
         else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
-            document.add_next_tick_callback(self.draw)
+            document.add_timeout_callback(self.draw, _PICTURES_FIRST)
 
     @abstractmethod
     def draw(self) -> None:

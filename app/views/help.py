@@ -76,7 +76,7 @@ class Help:
         names = {name: f"Help: {title}" for name, title in PICTURES.items()}
         self.pictures = ThreeD(
             state, renderer, "help", names, lambda: dict.fromkeys(names, state.lane),
-            lambda name, entry, *_shown: SCENES[name](entry),
+            lambda name, entry, *_shown: SCENES[name](entry, ()),
         )  # fmt: skip
         depth = Depth(state, "help")
         shown: dict[str, Any] = {"depth": depth.pane, **self.pictures.panes}

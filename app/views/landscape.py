@@ -10,7 +10,8 @@ import panel_material_ui as pmu
 from bokeh.models import ColumnDataSource, LinearColorMapper
 
 from app.state import State
-from app.views.plots import AFTER, BEFORE, Plot, calm_figure, heading
+from app.views.follower import Follower
+from app.views.plots import AFTER, BEFORE, calm_figure, heading
 from spf.hand.model import DOF_NAMES
 
 __all__ = ["LandscapeCard"]
@@ -18,11 +19,12 @@ __all__ = ["LandscapeCard"]
 _PALETTE = "Viridis256"
 
 
-class LandscapeCard(Plot):
+class LandscapeCard(Follower):
     """The plot, what the settings change in words, and the choice of the two entries."""
 
     def __init__(self, state: State) -> None:
         plot = calm_figure("", "", x_range=(-1, 1), y_range=(-1, 1))
+        plot.update(height=190, sizing_mode="stretch_width")  # among cards that take what room they need
         plot.grid.visible = False
         self.image = ColumnDataSource({"cost": [], "x": [], "y": [], "w": [], "h": []})
         self._mapper = LinearColorMapper(palette=_PALETTE)
@@ -32,7 +34,10 @@ class LandscapeCard(Plot):
             "x", "y", source=self.samples, color="colour", marker="marker", size="size", line_color="#20262c"
         )  # fmt: skip
         keys = ("■", BEFORE, "pred."), ("●", AFTER, "opt."), ("✚", "#ffffff", "estimate")
-        super().__init__(state, plot, heading("Cost E", *keys), also=("lane",))
+        super().__init__(state, None, also=("lane", "rules"))
+        self.figure = plot
+        self._heading = pn.pane.HTML(heading("Cost E", *keys), margin=(2, 10), sizing_mode="stretch_width")
+        self._pane = pn.pane.Bokeh(plot, height=190, min_height=190, sizing_mode="stretch_width", margin=0)
         self.note = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
         options = {name.replace("_", " "): index for index, name in enumerate(DOF_NAMES)}
         self._entries = [
@@ -41,9 +46,8 @@ class LandscapeCard(Plot):
         ]
         for select in self._entries:
             select.param.watch(self._picked, "value")
-        self.pane.param.update(height=190, sizing_mode="stretch_width")
         self.panel = pmu.Column(
-            self.note, self.heading, self.pane, pmu.Row(*self._entries, sizing_mode="stretch_width"),
+            self.note, self._heading, self._pane, pmu.Row(*self._entries, sizing_mode="stretch_width"),
             sizing_mode="stretch_width", margin=0,
         )  # fmt: skip
 

@@ -25,7 +25,7 @@ class LanesCard:
         )
         hint = pmu.Typography(
             "All begin with one start and one seed. The settings below are those of the tracker chosen here.",
-            variant="caption", margin=(0, 10), sx={"color": "#5c6873", "lineHeight": 1.3},
+            variant="caption", margin=(0, 10), sx={"opacity": 0.8, "lineHeight": 1.3},
         )  # fmt: skip
         state.param.watch(self._follow, ["mode", "lanes", "lane", "rules"])
         self.panel = pmu.Column(
@@ -88,7 +88,7 @@ class _Row:
         self._choose.param.update(
             label=lane.title,
             sx={
-                "justifyContent": "flex-start", "textAlign": "left", "lineHeight": 1.25, "color": "#2a3038",
+                "justifyContent": "flex-start", "textAlign": "left", "lineHeight": 1.25, "color": "#20262c !important",
                 "borderLeft": f"6px solid {self._colour}", "backgroundColor": "#dde6ef" if chosen else "#f4f6f8",
                 "fontWeight": 600 if chosen else 400, "&:hover": {"backgroundColor": "#e6edf4"},
             },

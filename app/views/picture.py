@@ -52,11 +52,13 @@ class Picture(JSComponent):
       if (!model.turns) return frame;
 
       // Movements add up while the server draws; the sum is sent when its picture has arrived, or after a while.
-      let right = 0, up = 0, magnify = 1, waiting = false, timer = null;
+      let right = 0, up = 0, magnify = 1, aside = 0, above = 0, waiting = false, timer = null;
       const send = () => {
-        if (waiting || (right === 0 && up === 0 && magnify === 1)) return;
-        model.send_msg({ kind: 'orbit', right, up, magnify });
-        right = 0; up = 0; magnify = 1; waiting = true;
+        const turned = right !== 0 || up !== 0 || magnify !== 1, moved = aside !== 0 || above !== 0;
+        if (waiting || !(turned || moved)) return;
+        if (turned) model.send_msg({ kind: 'orbit', right, up, magnify });
+        if (moved) model.send_msg({ kind: 'pan', right: aside, up: above });
+        right = 0; up = 0; magnify = 1; aside = 0; above = 0; waiting = true;
         timer = setTimeout(() => answered(), 300);
       };
       answered = () => { clearTimeout(timer); waiting = false; send(); };
@@ -64,8 +66,15 @@ class Picture(JSComponent):
       frame.addEventListener('pointerdown', (e) => { frame.setPointerCapture(e.pointerId); e.preventDefault(); });
       frame.addEventListener('pointermove', (e) => {
         if (!frame.hasPointerCapture(e.pointerId)) return;
-        right -= e.movementX * 0.01; up += e.movementY * 0.01; send();
+        if (e.shiftKey || (e.buttons & 6)) {  // the right or the middle button
+          const height = img.clientHeight || 1;
+          aside += e.movementX / height; above -= e.movementY / height;
+        } else {
+          right -= e.movementX * 0.01; up += e.movementY * 0.01;
+        }
+        send();
       });
+      frame.addEventListener('contextmenu', (e) => e.preventDefault());
       frame.addEventListener('wheel', (e) => {
         e.preventDefault(); magnify *= Math.exp(-e.deltaY * 0.0015); send();
       }, { passive: false });
@@ -92,16 +101,19 @@ class Picture(JSComponent):
         self,
         on_shown: Callable[[], None] | None = None,
         on_orbit: Callable[[float, float, float], None] | None = None,
+        on_pan: Callable[[float, float], None] | None = None,
         on_reset: Callable[[], None] | None = None,
         **params: Any,
     ) -> None:
         super().__init__(turns=on_orbit is not None, **params)
-        self._shown, self._orbit, self._reset = on_shown, on_orbit, on_reset
+        self._shown, self._orbit, self._pan, self._reset = on_shown, on_orbit, on_pan, on_reset
 
     def _handle_msg(self, msg: dict[str, Any]) -> None:
         if msg["kind"] == "shown" and self._shown is not None:
             self._shown()
         elif msg["kind"] == "orbit" and self._orbit is not None:
             self._orbit(float(msg["right"]), float(msg["up"]), float(msg["magnify"]))
+        elif msg["kind"] == "pan" and self._pan is not None:
+            self._pan(float(msg["right"]), float(msg["up"]))
         elif msg["kind"] == "reset" and self._reset is not None:
             self._reset()

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from typing import Any
 
 import panel as pn
-from bokeh.models import Span
+from bokeh.models import CategoricalTicker, Span
 from bokeh.plotting import figure
 
 from app.state import State
@@ -23,8 +23,10 @@ def css(colour: tuple[float, float, float]) -> str:
     return "#" + "".join(f"{round(255 * part):02x}" for part in colour)
 
 
+_INK = "var(--panel-on-background-color, #2a3038)"  # the page's own, whether it is light or dark
+
 #: Before and after optimisation, as in the renders; a calm third one; loss.
-BEFORE, AFTER, CALM, LOSS = css(PREDICTED), css(OPTIMISED), "#44505c", css(RESIDUAL)
+BEFORE, AFTER, CALM, LOSS = css(PREDICTED), css(OPTIMISED), "#76828e", css(RESIDUAL)
 
 
 def calm_figure(x_label: str, y_label: str, **options: Any) -> figure:
@@ -39,7 +41,8 @@ def calm_figure(x_label: str, y_label: str, **options: Any) -> figure:
         axis.major_label_text_font_size, axis.axis_label_standoff = "10px", 4
         axis.axis_line_color, axis.minor_tick_line_color, axis.major_tick_line_color = "#9aa4ae", None, "#9aa4ae"
     plot.grid.grid_line_color = "#e6eaee"
-    plot.yaxis.ticker.desired_num_ticks = 4
+    if not isinstance(plot.yaxis[0].ticker, CategoricalTicker):
+        plot.yaxis.ticker.desired_num_ticks = 4
     return plot
 
 
@@ -50,16 +53,19 @@ def heading(title: str, *keys: tuple[str, str, str]) -> str:
         for sign, colour, meaning in keys
     )
     return (
-        "<div style='font:500 13px/24px Roboto,sans-serif;color:#2a3038;white-space:nowrap'>"
-        f"{title}<span style='font-weight:400;font-size:12px;color:#44505c'>{legend}</span></div>"
+        f"<div style='font:500 13px/24px Roboto,sans-serif;color:{_INK};white-space:nowrap'>"
+        f"{title}<span style='font-weight:400;font-size:12px;opacity:0.85'>{legend}</span></div>"
     )
 
 
 class Plot(Follower):
     """A pane that follows the state, under a heading."""
 
-    def __init__(self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = ()) -> None:
-        super().__init__(state, mode, also)
+    def __init__(
+        self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = (),
+        look: tuple[str, ...] = (),
+    ) -> None:  # fmt: skip
+        super().__init__(state, mode, also, look)
         self.figure = plot
         self.heading = pn.pane.HTML(title, margin=(2, 4), sizing_mode="stretch_width")
         self.pane = pn.pane.Bokeh(plot, sizing_mode="stretch_both", margin=0)

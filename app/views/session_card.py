@@ -94,5 +94,7 @@ def described(session: Session) -> str:
         f"{side} · {'with' if session.has_truth else 'no'} truth",
     ]
     warnings = "".join(f"<div class='session-warning'>{html.escape(text)}</div>" for text in session.warnings)
-    style = "<style>.session-warning{color:#8a4b00;margin-top:4px}</style>"
-    return f"{style}<div style='font:12.5px/1.5 Roboto,sans-serif;color:#44505c'>{'<br>'.join(facts)}{warnings}</div>"
+    style = "<style>.session-warning{color:var(--warning-text-color,#8a4b00);margin-top:4px}</style>"
+    words = f"{'<br>'.join(facts)}{warnings}"
+    ink = "color:var(--panel-on-background-color,#44505c)"
+    return f"{style}<div style='font:12.5px/1.5 Roboto,sans-serif;{ink}'>{words}</div>"

@@ -14,13 +14,17 @@ from spf.evaluate import count_losses
 
 __all__ = ["Table", "measures"]
 
+_INK = "var(--panel-on-background-color,#5c6873)"  # the page's own, whether it is light or dark
+
 _COLUMNS = ("", "error, mm", "overlap", "losses", "lost frames", "ms a frame")
 _STYLE = """<style>
-.lanes { border-collapse: collapse; width: 100%; font: 12.5px/1.35 Roboto, sans-serif; color: #2a3038; }
-.lanes th { font-weight: 400; color: #5c6873; text-align: right; padding: 2px 5px; }
-.lanes td { text-align: right; padding: 4px 5px; border-top: 1px solid #e6eaee; font-variant-numeric: tabular-nums; }
+.lanes { border-collapse: collapse; width: 100%; font: 12.5px/1.35 Roboto, sans-serif;
+         color: var(--panel-on-background-color, #2a3038); }
+.lanes th { font-weight: 400; color: inherit; opacity: 0.8; text-align: right; padding: 2px 5px; }
+.lanes td { text-align: right; padding: 4px 5px; border-top: 1px solid var(--divider-color, #e6eaee);
+            font-variant-numeric: tabular-nums; }
 .lanes td:first-child { text-align: left; border-left: 5px solid var(--lane); }
-.lanes small { color: #8a4b00; }
+.lanes small { color: var(--warning-text-color, #8a4b00); }
 </style>"""
 
 
@@ -42,7 +46,7 @@ class Table(Follower):
         note = " Mixed: the settings were changed on the way; restart to compare." if mixed else ""
         self.pane.object = (
             f"{_STYLE}<table class='lanes'><tr>{head}</tr>{rows}</table>"
-            f"<div style='font:12px/1.6 Roboto,sans-serif;color:#5c6873;padding:4px 5px'>{frames}; means, and the median "
+            f"<div style='font:12px/1.6 Roboto,sans-serif;color:{_INK};padding:4px 5px'>{frames}; means, and the median "
             f"time.{note}</div>"
         )
 

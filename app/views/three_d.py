@@ -11,16 +11,18 @@ from typing import Any
 import panel as pn
 
 from app.lane import Lane
+from app.look import Shown
 from app.results import Entry
 from app.state import State
 from app.views.picture import Picture
 from app.views.scenes import view_of
 from spf.errors import RenderError, RenderUnavailableError
-from spf.render import Renderer, Scene
+from spf.render import Renderer, Scene, ViewCamera
 
 __all__ = ["ThreeD"]
 
-_QUICK, _SHARP = (368, 276), (736, 552)
+Size = tuple[int, int]
+_SIZES: tuple[Size, Size] = (368, 276), (736, 552)  # quick, sharp
 _SETTLED = 0.3  # s without a movement after which the sharp pictures are drawn
 _PATIENCE = 1.0  # s that playing waits for a browser that shows nothing, such as a hidden tab
 _log = logging.getLogger(__name__)
@@ -36,6 +38,8 @@ class ThreeD:
         names: name of each picture → what it shows, for who cannot see it.
         lanes: returns the lane that each picture shows; a name without one is a picture that shows nothing.
         scene: makes the scene of a picture, None when there is nothing to draw.
+        tab: of the page of one tracker that the pictures are seen in.
+        sizes: (width, height) in pixels of quick pictures, and of sharp ones.
     """
 
     def __init__(
@@ -45,50 +49,73 @@ class ThreeD:
         mode: str,
         names: dict[str, str],
         lanes: Callable[[], dict[str, Lane]],
-        scene: Callable[[str, Entry], Scene | None],
+        scene: Callable[[str, Entry, Shown], Scene | None],
+        *,
+        tab: str = "overview",
+        sizes: tuple[Size, Size] = _SIZES,
     ) -> None:
-        self._state, self._renderer, self._mode, self._lanes, self._scene = state, renderer, mode, lanes, scene
+        self._state, self._renderer, self._lanes, self._scene = state, renderer, lanes, scene
+        self._mode, self._tab, self._sizes = mode, tab, sizes
         self.panes = {
             name: Picture(
-                on_shown=self._on_shown, on_orbit=self._on_orbit, on_reset=state.reset_view,
+                on_shown=self._on_shown, on_orbit=self._on_orbit, on_pan=self._on_pan, on_reset=state.reset_view,
                 alt=alt, sizing_mode="stretch_both", margin=0,
             )
             for name, alt in names.items()
         }  # fmt: skip
-        self._made: dict[str, tuple[Entry, Scene | None]] = {}
+        self._made: dict[str, tuple[Entry, Shown, Scene | None]] = {}
         self._wanted = False
         self._moved = 0.0
+        self._view: ViewCamera | None = None  # of the last picture
         self._drawing: asyncio.Task[None] | None = None
         self._awaited = 0  # pictures sent to the browser that it has not shown yet
+        self._asked = self._sent = self._seen = self._before = 0  # requests so far: made, sent, seen, at the last wait
         self._all_shown = asyncio.Event()
         state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
+        state.look.param.watch(self.request, ["tab", "layers", "colouring", "selected", "pan", "anchor"])
 
-    def request(self, *_events: Any) -> None:
-        """Have the present state drawn soon."""
-        if self._state.mode != self._mode:
+    def request(self, *events: Any) -> None:
+        """Have the present state drawn soon; a new frame quickly first, and sharp when it has settled."""
+        if any(event.name == "revision" for event in events):
+            self._moved = time.monotonic()
+        state = self._state
+        if state.mode != self._mode or (self._mode == "one" and state.look.tab != self._tab):
             return
         self._wanted = True
+        self._asked += 1
         if self._drawing is None or self._drawing.done():
             self._drawing = asyncio.get_running_loop().create_task(self._draw_until_settled())
 
     async def drawn(self) -> None:
-        """Wait until the browser shows what was last requested; at most a second."""
-        if self._drawing is not None:
-            await self._drawing
-        if self._awaited:
+        """Wait until the browser shows what was requested before the last wait; at most a second.
+
+        So one frame is drawn while the next one is tracked, and never two.
+        """
+        goal, self._before = self._before, self._asked
+        deadline = time.monotonic() + _PATIENCE
+        while self._seen < goal:
+            self._all_shown.clear()
             try:
-                await asyncio.wait_for(self._all_shown.wait(), _PATIENCE)
+                await asyncio.wait_for(self._all_shown.wait(), deadline - time.monotonic())
             except TimeoutError:
-                self._awaited = 0  # nobody is looking: go on without
+                self._awaited, self._seen = 0, self._asked  # nobody is looking: go on without
 
     def _on_shown(self) -> None:
         self._awaited = max(self._awaited - 1, 0)
         if not self._awaited:
+            self._seen = max(self._seen, self._sent)
             self._all_shown.set()
 
     def _on_orbit(self, right: float, up: float, magnify: float) -> None:
         self._moved = time.monotonic()
         self._state.orbit(right, up, magnify)
+
+    def _on_pan(self, right: float, up: float) -> None:
+        """Move the eye against a drag, given in heights of the picture."""
+        self._moved = time.monotonic()
+        if self._view is not None:
+            seen, pan = self._view.extent / self._view.zoom, self._state.look.pan
+            self._state.look.pan = (pan[0] - seen * right, pan[1] - seen * up)
 
     async def _draw_until_settled(self) -> None:
         """Draw until nothing newer is wanted; then, unless playing, once more and sharp."""
@@ -112,16 +139,17 @@ class ThreeD:
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
 
     async def _draw(self, *, sharp: bool) -> None:
-        state, lanes = self._state, self._lanes()
+        state, lanes, asked = self._state, self._lanes(), self._asked
         entries = {name: entry for name, lane in lanes.items() if (entry := lane.entry(state.frame)) is not None}
         scenes = await self._scenes(entries)
         for name, lane in lanes.items():
             if name not in scenes:
                 self.panes[name].param.update(image=b"", hint=self._hint(lane))
         if not scenes:
+            self._seen = asked
             return
-        view = view_of((entries[name] for name in scenes), state.azimuth, state.elevation, state.zoom)
-        size, quality = (_SHARP, 92) if sharp else (_QUICK, 80)
+        view = self._view = view_of((entries[name] for name in scenes), state)
+        size, quality = (self._sizes[1], 92) if sharp else (self._sizes[0], 80)
         futures = {
             name: asyncio.wrap_future(
                 self._renderer.submit(scene, view, size, encoding="jpeg", quality=quality, smooth=sharp)
@@ -129,24 +157,23 @@ class ThreeD:
             for name, scene in scenes.items()
         }
         pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
-        self._all_shown.clear()
-        self._awaited = len(pictures)
+        self._awaited, self._sent = len(pictures), asked
         with pn.io.hold():
             for name, picture in pictures.items():
                 self.panes[name].image = picture
 
     async def _scenes(self, entries: dict[str, Entry]) -> dict[str, Scene]:
         """The scenes of entries, made beside the event loop unless they were drawn last."""
-        loop = asyncio.get_running_loop()
-        made: dict[str, tuple[Entry, Scene | None]] = {}
+        loop, shown = asyncio.get_running_loop(), self._state.look.shown
+        made: dict[str, tuple[Entry, Shown, Scene | None]] = {}
         for name, entry in entries.items():
             last = self._made.get(name)
-            if last is not None and last[0] is entry:
+            if last is not None and last[0] is entry and last[1] == shown:
                 made[name] = last
             else:
-                made[name] = entry, await loop.run_in_executor(None, self._scene, name, entry)
+                made[name] = entry, shown, await loop.run_in_executor(None, self._scene, name, entry, shown)
         self._made = made
-        return {name: scene for name, (_, scene) in made.items() if scene is not None}
+        return {name: scene for name, (_, _, scene) in made.items() if scene is not None}
 
     def _hint(self, lane: Lane) -> str:
         """What is said in place of a picture."""

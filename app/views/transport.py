@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
@@ -44,7 +45,7 @@ class Transport(Follower):
 
     async def _wish(self, wish: dict[str, Any]) -> None:
         state, controller, kind = self.state, self._controller, wish["kind"]
-        actions: dict[str, Callable[[], Awaitable[None] | None]] = {
+        actions: dict[str, Callable[[], object]] = {
             "play": controller.pause if state.playing else controller.play,
             "step": controller.forward, "back": controller.back, "first": controller.first, "last": controller.last,
             "worst": controller.worst, "loss": controller.next_loss, "restart": controller.restart,
@@ -58,7 +59,7 @@ class Transport(Follower):
             ),
         }  # fmt: skip
         done = actions[kind]()
-        if done is not None:
+        if inspect.isawaitable(done):
             await done
 
     # ---- what the state says

@@ -29,6 +29,7 @@ from spf.filters.step import start_at
 from spf.frame import Camera, Frame
 from spf.hand.kinematics import joints_of
 from spf.hand.model import Hand
+from spf.lens import seen_through
 from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession, synthesise
@@ -145,17 +146,20 @@ def _recorded(path: str, count: int) -> list[dict[str, Any]]:
     """Kidnap the tracker of a recording at frames spread over it, whose labels the depth does not contradict."""
     source = recordings(path, 1, sys.maxsize)[0]
     session = open_source(source)
-    labelled = hand_of_labels(session)
     start = prepare(session, seed=0)
+    lens = start.shape.lens
+    labelled = hand_of_labels(session, lens)
     rows: list[dict[str, Any]] = []
     for turn, wanted in enumerate(
         np.linspace(start.frame + _BEFORE, len(session) - _AFTER, count + 2)[1:-1].astype(int)
     ):
         rng = np.random.default_rng([turn, 13])
         ahead = range(wanted, len(session) - _AFTER)
-        at = next((i for i in ahead if label_energy(labelled, session[i]) < CONTRADICTED), int(wanted))
+        at = next(
+            (i for i in ahead if label_energy(labelled, seen_through(session[i], lens)) < CONTRADICTED), int(wanted)
+        )
         tracking, state = begin("spf", make_settings("spf"), start, turn, time=float(session.times[start.frame]))
-        held = floor_of(labelled, session[at - 1], rng)
+        held = floor_of(labelled, session[at - 1], rng, lens=lens)
         assert held is not None
         pose = held.pose.copy()
         pose[:3] += _direction(rng, _WAYS) * _JUMP
@@ -178,7 +182,7 @@ def _followed(
     for frame in frames:
         state, result = track_frame(tracking, state, frame)
         joints = joints_of(own, result.pose, result.reference)
-        above.append(_above_floor_mm(joints, frame, labelled))
+        above.append(_above_floor_mm(joints, seen_through(frame, tracking.start.shape.lens), labelled))
         lost.append(bool(result.lost))
         seconds.append(result.seconds)
     held = np.array([a is not None and a < _HELD_MM for a in above])

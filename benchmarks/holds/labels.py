@@ -9,6 +9,7 @@ from spf.evaluate.floor import marked
 from spf.frame import JOINT_NAMES
 from spf.hand.model import Hand
 from spf.joint_definitions import offsets_of
+from spf.lens import as_stated
 from spf.prepare import side_of
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession
@@ -27,13 +28,17 @@ def true_side(session: Session) -> str | None:
     return "right" if np.mean(rights) > 0.5 else "left"
 
 
-def hand_of_labels(session: Session) -> Hand:
-    """Return the hand that the labels show: the exact one, or one that they size; its joints are where they mark them."""
+def hand_of_labels(session: Session, lens: float = 1.0) -> Hand:
+    """Return the hand that the labels show: the exact one, or one that they size; its joints are where they mark them.
+
+    Args:
+        session: with truth.
+        lens: that the hand is seen through (:mod:`spf.lens`).
+    """
     if isinstance(session, SyntheticSession):
         return session.hand
-    return labelled_hand(
-        "left" if true_side(session) == "left" else "right", _some_joints(session, _SIZE_FRAMES), _offsets(session)
-    )
+    joints = _some_joints(session, _SIZE_FRAMES) / as_stated(np.ones(3), lens)
+    return labelled_hand("left" if true_side(session) == "left" else "right", joints, _offsets(session))
 
 
 def as_labelled(session: Session, hand: Hand) -> Hand:

@@ -26,6 +26,7 @@ from spf.evaluate.floor import floor_of
 from spf.hand.kinematics import joints_of
 from spf.hand.model import Hand
 from spf.initialise import Start, find_start
+from spf.lens import as_stated
 from spf.prepare import SessionFrames
 from spf.sessions import Session
 from spf.track import begin, track_frame
@@ -134,10 +135,13 @@ def _found(session: Session, place: _Place, given: int, hand: Hand, side: str | 
             "seconds": 0.0,
         }
     seconds = time.perf_counter() - began
-    found = as_labelled(session, start.shape.hand())
+    found, lens = as_labelled(session, start.shape.hand()), start.shape.lens
     posed = (start.pose, start.reference) if given == 1 else _followed(frames, start)
     floor = floor_of(hand, frames[-1], np.random.default_rng(0), exact=True)
-    apart = None if floor is None else _apart_mm(joints_of(found, *posed), joints_of(hand, floor.pose, floor.reference))
+    apart = None
+    if floor is not None:
+        joints = as_stated(joints_of(found, *posed), lens)
+        apart = _apart_mm(joints, joints_of(hand, floor.pose, floor.reference))
     return row | {
         "apart_mm": apart, "right_side": start.shape.side == side, "golden": start.golden, "margin": start.margin,
         "doubt": start.doubted or "", "size": found.length / hand.length, "seconds": seconds,

@@ -15,6 +15,7 @@ from spf.evaluate.contradictions import CONTRADICTED, label_energy
 from spf.evaluate.floor import floor_of
 from spf.hand.kinematics import joints_of
 from spf.initialise import Start, find_start
+from spf.lens import as_stated, seen_through
 from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession
@@ -83,16 +84,19 @@ def _floor_part(session: Session, frames: SessionFrames, start: Start) -> dict[s
         return {}
     hand = as_labelled(session, start.shape.hand())
     exact = session.hand if isinstance(session, SyntheticSession) else None
-    labelled = hand_of_labels(session)
+    lens = start.shape.lens
+    labelled = hand_of_labels(session, lens)
     part: dict[str, list[Any]] = {"fitted_mm": [], "floor_mm": [], "exact_floor_mm": [], "label_golden": []}
     for frame in frames[start.frame :]:
         rng = np.random.default_rng([frame.index, 7])
-        own = floor_of(hand, frame, rng)
+        own = floor_of(hand, frame, rng, lens=lens)
         best = None if exact is None else floor_of(exact, frame, rng, exact=True)
         part["fitted_mm"].append(None if own is None else _mm(own.fitted))
         part["floor_mm"].append(None if own is None else _mm(own.descended))
         part["exact_floor_mm"].append(None if best is None else _mm(best.descended))
-        part["label_golden"].append(None if frame.truth is None else round(label_energy(labelled, frame), 4))
+        part["label_golden"].append(
+            None if frame.truth is None else round(label_energy(labelled, seen_through(frame, lens)), 4)
+        )
     part["flagged"] = [golden is not None and golden > CONTRADICTED for golden in part["label_golden"]]
     return part
 
@@ -103,7 +107,7 @@ def _tracked(
     """Track from a start; everything by frame, from the start's on."""
     settings = make_settings(asked.tracker, asked.preset, _with_count(asked, count))
     tracking, state = begin(asked.tracker, settings, start, source.seed, time=float(session.times[start.frame]))
-    hand = as_labelled(session, tracking.hand)
+    hand, lens = as_labelled(session, tracking.hand), start.shape.lens
     rows: dict[str, list[Any]] = {
         "error_mm": [], "largest_mm": [], "lost": [], "golden": [], "iou": [], "seconds": [], "cpu_seconds": []
     }  # fmt: skip
@@ -115,11 +119,12 @@ def _tracked(
         rows["lost"].append(bool(result.lost))
         rows["golden"].append(None if np.isnan(result.golden) else round(result.golden, 4))
         if not source.synthetic:
-            agreement = agreement_with_depth(tracking.hand, result.pose, result.reference, frame)
+            agreement = agreement_with_depth(tracking.hand, result.pose, result.reference, seen_through(frame, lens))
             rows["iou"].append(0.0 if result.lost else round(agreement.silhouette_iou, 4))
         errors = None
         if frame.truth is not None:
-            errors = np.linalg.norm(joints_of(hand, result.pose, result.reference) - frame.truth.joints, axis=1)
+            joints = as_stated(joints_of(hand, result.pose, result.reference), lens)
+            errors = np.linalg.norm(joints - frame.truth.joints, axis=1)
         rows["error_mm"].append(None if errors is None else _mm(errors))
         rows["largest_mm"].append(None if errors is None else round(1e3 * float(np.nanmax(errors)), 3))
     return rows

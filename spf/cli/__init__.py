@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import typer
 
-from spf.cli import comparing, results, sessions, sharing, tracking
+from spf.cli import comparing, live, results, sessions, sharing, tracking
 from spf.cli.console import INTERRUPTED, complain, show_version
 from spf.errors import SpfError
 
@@ -27,7 +27,10 @@ app = typer.Typer(
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (*sessions.COMMANDS, *tracking.COMMANDS, *results.COMMANDS, *sharing.COMMANDS):
+_COMMANDS = (
+    *sessions.COMMANDS, *tracking.COMMANDS, *live.COMMANDS, *results.COMMANDS, *sharing.COMMANDS,
+)  # fmt: skip
+for command in _COMMANDS:
     app.command()(command)
 app.command(name="compare")(comparing.compare_trackers)
 

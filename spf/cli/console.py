@@ -14,8 +14,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from spf import __version__
-from spf.errors import RunError, SettingError
+from spf.errors import RunError, SessionError, SettingError
 from spf.initialise import Doubted, Start
+from spf.live import is_live
 from spf.sessions import Session, open_session
 
 __all__ = [
@@ -51,9 +52,10 @@ def warn(sentence: str) -> None:
 
 
 def warn_of(start: Start) -> None:
-    """Warn of a start that may be wrong, and say what to do; nothing for one that is believed."""
+    """Warn of a start that may be wrong and of a camera that is, and say what to do; nothing where all is believed."""
     if start.doubted is not None:
         warn(f"{start.doubt} {_REMEDIES[start.doubted]}")
+    warn(start.remark)
 
 
 def print_json(value: Any) -> None:
@@ -84,6 +86,8 @@ def open_given(uri: str, camera: Path | None = None) -> Session:
     Raises:
         SessionError: it cannot be opened.
     """
+    if is_live(uri):
+        raise SessionError(f"{uri} is a live sensor: 'spf record {uri} -o FILE' records it, 'spf track' tracks it.")
     session = open_session(uri, camera)
     for sentence in session.warnings:
         warn(sentence)

@@ -19,16 +19,18 @@ from spf.cli.console import (
     print_json,
     progress_bar,
 )
-from spf.errors import SpfError
+from spf.errors import SettingError, SpfError
 from spf.segmentation import find_regions
 from spf.sessions import MCAPWriter, Session
 from spf.synthetic import CLUTTER, MOTIONS, SENSORS, SHAPES, SyntheticSettings, synthesise
 
-__all__ = ["COMMANDS", "convert", "info", "synth"]
+__all__ = ["COMMANDS", "convert", "info", "split", "synth", "trim"]
 
-SessionPath = Annotated[str, typer.Argument(metavar="SESSION", help="An MCAP file or a folder of depth images.")]
+SessionPath = Annotated[
+    str, typer.Argument(metavar="SESSION", help="A recording, a file or a folder (docs/formats.md).")
+]
 CameraFile = Annotated[
-    Path | None, typer.Option("--camera", metavar="FILE", help="Camera file of a PNG folder without a camera.json.")
+    Path | None, typer.Option("--camera", metavar="FILE", help="Camera file, where none or a wrong one is recorded.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace what is there.")]
@@ -77,6 +79,8 @@ def _facts(session: Session) -> dict[str, Any]:
         "truth": session.joint_definition if session.has_truth else None,
         "exact_hand_shape": session.hand_shape is not None,
         "sensor": session.metadata.get("sensor"),
+        "contents": list(session.contents),
+        "notes": [f"{note.time:.1f} s {note.kind}: {note.text}" for note in session.notes],
         "warnings": list(session.warnings),
     }
 
@@ -97,6 +101,51 @@ def convert(
         first, last = parse_range(frames, len(opened))
         _write(opened, output, first, last)
     print(f"Wrote {last - first} frames to {output}.")
+
+
+def trim(
+    session: SessionPath,
+    frames: Annotated[str, typer.Argument(metavar="A:B", help="Frames A to B−1; either may be left out.")],
+    output: Annotated[Path, typer.Argument(metavar="OUT.mcap", help="The file to write.")],
+    camera: CameraFile = None,
+    force: Force = False,
+) -> None:
+    """Keep a part of a session: its depth, colour, truth, times and notes as they are.
+
+    Example:  spf trim sessions/open-close.mcap 20:80 middle.mcap
+    """
+    convert(session, output, camera, frames, force)
+
+
+def split(
+    session: SessionPath,
+    output: Annotated[Path, typer.Argument(metavar="OUT.mcap", help="Parts are named OUT-1.mcap, OUT-2.mcap, ….")],
+    at: Annotated[str, typer.Option(metavar="A,B,…", help="First frames of the parts after the first.")],
+    camera: CameraFile = None,
+    force: Force = False,
+) -> None:
+    """Split a session before some of its frames; every frame is in one part.
+
+    Example:  spf split sessions/open-close.mcap part.mcap --at 40,80
+    """
+    with open_given(session, camera) as opened:
+        bounds = [0, *_cuts(at, len(opened)), len(opened)]
+        parts = [output.with_name(f"{output.stem}-{number}.mcap") for number in range(1, len(bounds))]
+        for part in parts:
+            check_output(part, force)
+        for part, first, last in zip(parts, bounds[:-1], bounds[1:], strict=True):
+            _write(opened, part, first, last)
+            print(f"Wrote {last - first} frames to {part}.")
+
+
+def _cuts(text: str, count: int) -> list[int]:
+    try:
+        cuts = [int(word) for word in text.split(",")]
+    except ValueError:
+        raise SettingError(f"--at takes frames like 40,80, not '{text}'.") from None
+    if not all(before < after for before, after in zip([0, *cuts], [*cuts, count], strict=True)):
+        raise SettingError(f"--at takes increasing frames from 1 to {count - 1}, not '{text}'.")
+    return cuts
 
 
 def _write(session: Session, output: Path, first: int, last: int) -> None:
@@ -120,6 +169,9 @@ def _write(session: Session, output: Path, first: int, last: int) -> None:
     )
     try:
         with writer, progress_bar() as report:
+            for note in session.notes:
+                if session.times[first] <= note.time <= session.times[last - 1]:
+                    writer.add_note(note)
             for done, index in enumerate(range(first, last), 1):
                 writer.write(session[index])
                 report(f"Writing {output.name}", done / (last - first))
@@ -169,4 +221,4 @@ def synth(
     print(f"Wrote {len(session)} frames of a {session.side} hand to {output}.\nNext: spf track {output} -o RUN")
 
 
-COMMANDS = (info, convert, synth)
+COMMANDS = (info, convert, trim, split, synth)

@@ -21,15 +21,18 @@ from spf.cli.console import (
     warn,
     warn_of,
 )
+from spf.cli.live import Seconds, Wait, track_live
 from spf.cli.sessions import AsJson, CameraFile, Force, SessionPath
 from spf.errors import RunError, SettingError
 from spf.evaluate import count_losses
 from spf.hand import SavedPose, read_hand_shape, write_hand_shape, write_pose
 from spf.initialise import Start
 from spf.learned.network import available_network
+from spf.live import is_live
+from spf.live.tracking import Request
 from spf.manifest import Plan, manifest_of
 from spf.prepare import prepare
-from spf.runs import RunWriter, check_free, read_run, reopen_session, track_plan
+from spf.runs import RECORDING, RunWriter, check_free, read_run, reopen_session, track_plan
 from spf.sessions import Session
 from spf.trackers import PRESETS, TRACKERS, make_settings
 from spf.trackfile import Track
@@ -79,7 +82,7 @@ def _description(start: Start) -> str:
 def track(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Directory of the run.")],
     session: Annotated[
-        str | None, typer.Argument(metavar="SESSION", help="An MCAP file or a folder of depth images.")
+        str | None, typer.Argument(metavar="SESSION", help="An MCAP file, a folder of depth images or a live sensor.")
     ] = None,
     tracker: Annotated[str | None, typer.Option(help=f"One of {', '.join(TRACKERS)}; spf if not given.")] = None,
     preset: Annotated[str | None, typer.Option(help=f"One of {', '.join(PRESETS)}; default if not given.")] = None,
@@ -97,11 +100,13 @@ def track(
     frames: FrameRange = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of everything random; 0 if not given.")] = None,
     camera: CameraFile = None,
+    seconds: Seconds = None,
+    wait: Wait = False,
     repeat: Annotated[Path | None, typer.Option(metavar="DIR", help="Repeat this run, bit for bit.")] = None,
     force: Force = False,
     as_json: AsJson = False,
 ) -> None:
-    """Track the hand of a session; the track and all that is needed to repeat it go to a directory.
+    """Track the hand of a session or a live sensor; the track and all that is needed to repeat it go to a directory.
 
     Examples:
 
@@ -110,17 +115,32 @@ def track(
         spf track recordings/P5 -o runs/b --preset paper --set n=16 --frames 0:300 --seed 3
 
         spf track --repeat runs/b -o runs/c
+
+        spf track replay:sessions/open-close.mcap -o runs/live
     """
     check_free(output, force)
     warn(available_network()[1])
+    live: dict[str, Any] = {}
     if repeat is not None:
         options: dict[str, Any] = {"--tracker": tracker, "--preset": preset, "--set": assignments, "--hand": hand}
-        options |= {"--init": init, "--frames": frames, "--seed": seed, "--camera": camera}
+        options |= {"--init": init, "--frames": frames, "--seed": seed, "--camera": camera, "--seconds": seconds}
         _refuse_with_repeat([name for name, value in options.items() if value is not None])
-        opened, plan, camera = _plan_to_repeat(repeat, session)
+        opened, plan, camera, live = _plan_to_repeat(repeat, session)
     elif session is None:
         raise SettingError("There is nothing to track: name a session, as in spf track SESSION -o DIR.")
+    elif is_live(session):
+        _refuse_live({"--frames": frames, "--camera": camera, "--init": None if init == "auto" else init})
+        settings = make_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
+        shape = None if hand is None else read_hand_shape(hand)
+        request = Request(
+            tracker or "spf", preset or "default", settings, seed or 0, shape, None if shape is None else shape.side
+        )
+        track_live(
+            session, output, output / RECORDING, request, seconds=seconds, wait=wait, force=force, as_json=as_json
+        )
+        return
     else:
+        _refuse_recorded(seconds, wait)
         settings = make_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
         shape = None if hand is None else read_hand_shape(hand)
         opened = open_given(session, camera)
@@ -132,7 +152,7 @@ def track(
         plan = Plan(tracker or "spf", preset or "default", settings, seed or 0, init or "auto", first, last, start)
     with opened:
         warn_of(plan.start)
-        track_found = _track_to(output, opened, plan, camera, force)
+        track_found = _track_to(output, opened, plan, camera, force, live)
     _summarise(output, track_found, plan, as_json)
 
 
@@ -141,7 +161,19 @@ def _refuse_with_repeat(given: list[str]) -> None:
         raise SettingError(f"--repeat takes everything from the run that it repeats: leave out {', '.join(given)}.")
 
 
-def _plan_to_repeat(directory: Path, session: str | None) -> tuple[Session, Plan, Path | None]:
+def _refuse_live(options: dict[str, Any]) -> None:
+    given = [name for name, value in options.items() if value is not None]
+    if given:
+        raise SettingError(f"A live sensor is tracked from where it is found on: leave out {', '.join(given)}.")
+
+
+def _refuse_recorded(seconds: float | None, wait: bool) -> None:
+    if seconds is not None or wait:
+        raise SettingError("--seconds and --wait are for live sensors; give a recording's frames with --frames A:B.")
+
+
+def _plan_to_repeat(directory: Path, session: str | None) -> tuple[Session, Plan, Path | None, dict[str, Any]]:
+    """Return the session, the plan, the camera file and, of a live run, its facts and the frames that it came to."""
     run = read_run(directory)
     opened = reopen_session(run.manifest, session)
     stored = run.manifest["session"]["camera_file"]
@@ -151,21 +183,28 @@ def _plan_to_repeat(directory: Path, session: str | None) -> tuple[Session, Plan
     ]
     if changed:
         warn(f"the run was made with another {' and '.join(changed)}, so that the track may differ in its last digits.")
-    return opened, run.plan, None if stored is None else Path(stored)
+    live = run.manifest.get("live")
+    about_live = {} if live is None else {"live": live, "frames": run.track.frame.tolist()}
+    return opened, run.plan, None if stored is None else Path(stored), about_live
 
 
-def _track_to(output: Path, session: Session, plan: Plan, camera: Path | None, force: bool) -> Track:
+def _track_to(
+    output: Path, session: Session, plan: Plan, camera: Path | None, force: bool, live: dict[str, Any]
+) -> Track:
     """Track a plan into a directory; Ctrl-C ends it with what was tracked until then.
 
     Raises:
         typer.Exit: Ctrl-C was pressed.
     """
     manifest = manifest_of(plan, session, camera, ["spf", *sys.argv[1:]])
+    frames = live.get("frames")
+    if frames is not None:
+        manifest["live"] = live["live"]
     writer = RunWriter(output, manifest, plan.start.shape.hand().dof_names, overwrite=force)
-    count = plan.last - plan.first
+    count = plan.last - plan.first if frames is None else len(frames)
     try:
         with writer, progress_bar() as report:
-            for done, result in enumerate(track_plan(session, plan), 1):
+            for done, result in enumerate(track_plan(session, plan, frames), 1):
                 writer.add(result)
                 report("Lost, searching" if result.lost else "Tracking", done / count)
     except KeyboardInterrupt:

@@ -18,6 +18,7 @@ from spf.filters.smart import SpfSettings
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of
 from spf.hand.model import Hand
+from spf.lens import as_stated, seen_through
 from spf.locate import reach_of
 from spf.observation import observe
 from spf.optimisers.smd import optimise
@@ -64,6 +65,7 @@ def floor_of(
     settings: SpfSettings | None = None,
     exact: bool = False,
     descents: int = 4,
+    lens: float = 1.0,
 ) -> Floor | None:
     """Fit a hand to a frame's truth, and descend from there.
 
@@ -74,6 +76,7 @@ def floor_of(
         settings: of the cost and the descent; the default filter's when None.
         exact: begin at the exact pose of the truth, which must be one of this very hand, not at a fitted one.
         descents: SMD runs whose ends are averaged, as a filter's estimate averages its particles.
+        lens: that the hand was found through (:mod:`spf.lens`); errors are as the stated camera shows them.
 
     Returns:
         The floor, or None when the frame has no truth or shows nothing where that puts the hand.
@@ -81,6 +84,7 @@ def floor_of(
     Raises:
         StartError: fewer than three joints of the palm are known.
     """
+    frame = seen_through(frame, lens)
     truth = frame.truth
     if truth is None:
         return None
@@ -97,5 +101,9 @@ def floor_of(
     precision[:6] = 0.0
     ends = [optimise(problem, chosen, rng, pose, prior=pose, precision=precision)[0] for _ in range(descents)]
     end = np.mean(ends, axis=0)
-    fitted, descended = (np.linalg.norm(joints_of(hand, p, reference) - truth.joints, axis=1) for p in (pose, end))
+    fitted, descended = (_apart(joints_of(hand, p, reference) - truth.joints, lens) for p in (pose, end))
     return Floor(fitted, descended, end, reference)
+
+
+def _apart(differences: Array, lens: float) -> Array:
+    return np.asarray(np.linalg.norm(as_stated(differences, lens), axis=1))

@@ -15,6 +15,7 @@ from spf.evaluate.losses import count_losses
 from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import pose_hand
 from spf.joint_definitions import corrected_joints, offsets_of
+from spf.lens import as_stated, seen_through
 from spf.runs import Run
 from spf.sessions import Session
 from spf.trackfile import Track
@@ -93,17 +94,18 @@ def compare_run(run: Run, session: Session, progress: Progress | None = None) ->
     """
     known = offsets_of(session.joint_definition) if session.has_truth else None
     offsets = np.zeros((len(JOINT_NAMES), 3)) if known is None else known
-    track, hand = run.track, run.plan.start.shape.hand()
+    track, found = run.track, run.plan.start.shape
+    hand = found.hand()
     result = Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (), ())))
     for row, index in enumerate(track.frame):
         frame = session[int(index)]
         posed = pose_hand(hand, track.poses[row], track.references[row])
-        result.corrected[row] = corrected_joints(hand, posed, offsets)
+        result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), found.lens)
         if frame.truth is not None:
             result.truth[row] = frame.truth.joints
         if not track.lost[row]:
             result.iou[row], result.distance[row] = agreement_with_depth(
-                hand, track.poses[row], track.references[row], frame
+                hand, track.poses[row], track.references[row], seen_through(frame, found.lens)
             )
         if progress is not None:
             progress("Comparing with the depth", (row + 1) / len(track))

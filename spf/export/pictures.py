@@ -16,6 +16,7 @@ from spf.export.writing import written_whole
 from spf.frame import Frame
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
+from spf.lens import as_stated, seen_through
 from spf.locate import reach_of
 from spf.observation import observe
 from spf.render import Points, Renderer, Scene, Skeleton, ViewCamera, reconstruction_scene
@@ -80,7 +81,7 @@ def row_of_frame(track: Track, frame: int) -> int:
     return int(found[0])
 
 
-def hand_scene(hand: Hand, track: Track, row: int, frame: Frame) -> Scene:
+def hand_scene(hand: Hand, track: Track, row: int, frame: Frame, lens: float = 1.0) -> Scene:
     """Show the hand of a frame among the observed points, the redder the farther from it; without hand while it is lost.
 
     Args:
@@ -88,18 +89,20 @@ def hand_scene(hand: Hand, track: Track, row: int, frame: Frame) -> Scene:
         track: of the run.
         row: of the frame in the track.
         frame: its depth image.
+        lens: that the hand was found through (:mod:`spf.lens`); all is shown where the stated camera puts it.
     """
     pose, reference = track.poses[row], track.references[row]
     if track.lost[row]:
         points = _points_around(frame, track.joints[row].mean(axis=0))
         return Scene(points=(Points(points.astype(np.float32), OBSERVED),))
     posed = pose_hand(hand, pose, reference)
-    points = _thinned(observe(frame, pose[:3], reach_of(hand)).hand_points)
+    points = _thinned(observe(seen_through(frame, lens), pose[:3], reach_of(hand)).hand_points)
+    vertices = as_stated(posed.vertices, lens)
     if not len(points):
-        return reconstruction_scene(posed.vertices, hand.faces)
+        return reconstruction_scene(vertices, hand.faces)
     distances = surface_distances(points, np.asarray(posed.vertices, np.float64), hand.faces)
     distances[beyond_wrist(points - posed.frames[0, :, 3], posed.frames[0, :, 2])] = 0.0  # the model has no forearm
-    return reconstruction_scene(posed.vertices, hand.faces, points=points, residuals=distances)
+    return reconstruction_scene(vertices, hand.faces, points=as_stated(points, lens), residuals=distances)
 
 
 def _points_around(frame: Frame, place: Array) -> Array:
@@ -169,7 +172,8 @@ def write_picture(
     if path.suffix not in (".png", ".jpg"):
         raise SettingError(f"A picture is written as .png or .jpg, not as '{path.suffix}': name {path} otherwise.")
     row = row_of_frame(run.track, frame)
-    scene = hand_scene(run.plan.start.shape.hand(), run.track, row, session[frame])
+    shape = run.plan.start.shape
+    scene = hand_scene(shape.hand(), run.track, row, session[frame], shape.lens)
     picture = renderer.picture(scene, hand_view(run.track, row, view), size, smooth=True)
     with written_whole(path) as part:
         part.write_bytes(encoded(picture, path.suffix))

@@ -71,5 +71,6 @@ def step(
     samples = Samples(
         ancestors, ("dynamics",) * settings.n, before, predicted, predicted[:0],
         judged, likelihood, np.zeros(settings.n), log_weights, float("nan"),
+        resampled=carried is not state.particles.log_weights,
     )  # fmt: skip
     return conclude(problem, settings.sigma2, state, interval, samples, clock, evaluations=settings.n)

@@ -28,6 +28,8 @@ class Samples(NamedTuple):
         judged: of all N + M samples.
         log_likelihood, log_correction, log_weights: (N + M,).
         window: h; nan when there is no kernel density estimate.
+        bandwidth: (D,) h times the process noise; None when there is no kernel density estimate.
+        resampled: whether the ancestors were drawn anew.
     """
 
     ancestors: NDArray[np.intp]
@@ -40,6 +42,8 @@ class Samples(NamedTuple):
     log_correction: Array
     log_weights: Array
     window: float
+    bandwidth: Array | None = None
+    resampled: bool = True
 
 
 def conclude(
@@ -91,6 +95,8 @@ def conclude(
         ess=ess(log_weights),
         optimised_share=float(np.exp(log_weights[count:]).sum()),
         window=samples.window,
+        bandwidth=np.full(poses.shape[1], np.nan) if samples.bandwidth is None else samples.bandwidth,
+        resampled=samples.resampled,
         estimate=estimate,
         estimate_golden=float(judged.golden[0]),
         estimate_overlap=float(judged.overlap[0]),

@@ -18,6 +18,7 @@ __all__ = [
     "correct",
     "log_correction",
     "log_density",
+    "marginal_density",
     "paper_window",
     "silverman_window",
 ]
@@ -85,6 +86,24 @@ def log_density(at: Array, samples: Array, window: float) -> Array:
     squared = cdist(at, samples, "sqeuclidean") / window**2
     constant = math.log(count) + dimensions * math.log(window) + 0.5 * dimensions * math.log(2.0 * math.pi)
     return np.asarray(log_sum_exp(-0.5 * squared) - constant)
+
+
+def marginal_density(x: Array, y: Array, samples: Array, bandwidth: Array) -> Array:
+    """Kernel density estimate (27) of two entries alone: a Gaussian kernel's marginal is a Gaussian kernel.
+
+    Args:
+        x, y: (W,), (H,) values of the two entries.
+        samples: (N, 2).
+        bandwidth: (2,) window of each entry, in its own unit.
+
+    Returns:
+        (H, W) density, for y down and x across.
+    """
+    across, upwards = (
+        np.exp(-0.5 * ((values[:, None] - column) / width) ** 2) / (width * math.sqrt(2.0 * math.pi))
+        for values, column, width in zip((x, y), samples.T, bandwidth, strict=True)
+    )
+    return np.asarray(upwards @ across.T / len(samples))
 
 
 def log_correction(predicted: Array, optimised: Array, window: float) -> Array:

@@ -88,7 +88,7 @@ def step(
     clock("weigh")
     samples = Samples(
         np.zeros(1, np.intp), ("estimate",), before[None], before[None], found[None],
-        judged, likelihood, np.zeros(2), log_weights, float("nan"),
+        judged, likelihood, np.zeros(2), log_weights, float("nan"), resampled=False,
     )  # fmt: skip
     return conclude(
         problem, SIGMA2, state, interval, samples, clock,

@@ -116,7 +116,9 @@ def step(
     clock("weigh")
     jumped = np.array([origin in ("structured", "learned") for origin in origins])
     before[jumped] = optimised[jumped]  # a jump is no motion
-    samples = Samples(ancestors, origins, before, predicted, optimised, judged, likelihood, log_c, log_weights, window)
+    samples = Samples(
+        ancestors, origins, before, predicted, optimised, judged, likelihood, log_c, log_weights, window, window * scale
+    )  # fmt: skip
     return conclude(  # (f) estimate
         problem, settings.sigma2, state, interval, samples, clock,
         evaluations=evaluations + len(log_weights), trajectories=trajectories,

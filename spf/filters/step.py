@@ -70,6 +70,8 @@ class StepInfo(NamedTuple):
         ess: effective sample size of the N + M samples.
         optimised_share: weight of the optimised samples.
         window: h that was used; nan when there is no kernel density estimate.
+        bandwidth: (D,) the window in the units of a pose, m and rad: h times the process noise; nan when there is none.
+        resampled: whether the ancestors were drawn anew; otherwise every particle goes on with its weight.
         estimate: (D,) pose, relative to ``reference``.
         estimate_golden, estimate_overlap, estimate_cost, estimate_log_likelihood: of the estimate.
         trajectories: M paths from a predicted to its optimised sample, or () when not recorded.
@@ -93,6 +95,8 @@ class StepInfo(NamedTuple):
     ess: float
     optimised_share: float
     window: float
+    bandwidth: Array
+    resampled: bool
     estimate: Array
     estimate_golden: float
     estimate_overlap: float
@@ -112,6 +116,14 @@ class StepInfo(NamedTuple):
     def optimised_weights(self) -> Array:
         """Weights (M,) of the optimised samples."""
         return np.exp(self.log_weights[len(self.predicted) :])
+
+    @property
+    def winner(self) -> str:
+        """Proposal that the heaviest particle, its predicted and its optimised sample together, was predicted by."""
+        weights = self.predicted_weights
+        if len(self.optimised):
+            weights = weights + self.optimised_weights
+        return self.origins[int(np.argmax(weights))]
 
 
 def start_at(hand: Hand, pose: Array, reference: Array, time_: float, count: int) -> State:

@@ -31,6 +31,8 @@ class HandShape(NamedTuple):
         palm_width, palm_thickness: factors on the palm across the knuckles and from palm to back.
         finger_thickness: factor on the digits' cross-sections.
         mesh: path of a ``.glb``, or "" for the bundled hand.
+        lens: factor on the focal lengths that the session states, through which a hand of this shape was found
+            (:mod:`spf.lens`); 1 where they were believed.
     """
 
     side: Side
@@ -40,6 +42,7 @@ class HandShape(NamedTuple):
     palm_thickness: float = 1.0
     finger_thickness: float = 1.0
     mesh: str = ""
+    lens: float = 1.0
 
     def hand(self, *, free_dip: bool = False) -> Hand:
         """Build the hand of this shape."""
@@ -63,6 +66,7 @@ class HandShape(NamedTuple):
             shape = cls(**{**values, "lengths": tuple(float(x) for x in content.get("lengths", (1.0,) * 15))})
             numbers = [float(shape.scale), *shape.lengths]
             numbers += [float(shape.palm_width), float(shape.palm_thickness), float(shape.finger_thickness)]
+            numbers += [float(shape.lens)]
         except (TypeError, ValueError):
             raise HandError(f"{source} holds something that is not a number; calibrate the hand again.") from None
         ranges = [_SCALE_RANGE] + [_LENGTH_RANGE] * (len(numbers) - 1)

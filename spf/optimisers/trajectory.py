@@ -23,9 +23,9 @@ class Trajectory(NamedTuple):
         step_sizes: (I + 1, D) a of every entry; nan for an optimiser that has none.
     """
 
-    poses: Array
-    costs: Array
-    step_sizes: Array
+    poses: NDArray[np.floating[Any]]
+    costs: NDArray[np.floating[Any]]
+    step_sizes: NDArray[np.floating[Any]]
 
 
 class Optimise(Protocol):

@@ -30,6 +30,7 @@ class ViewCamera(NamedTuple):
         azimuth: radians; positive moves the eye to the right of the picture.
         elevation: radians; positive moves the eye up. Any angle is allowed: nothing flips at the poles.
         zoom: magnification, > 0.
+        pan: metres that eye and focal point are moved to the right and up in the picture.
     """
 
     focal_point: tuple[float, float, float] = (0.0, 0.0, 0.5)
@@ -38,6 +39,7 @@ class ViewCamera(NamedTuple):
     azimuth: float = 0.0
     elevation: float = 0.0
     zoom: float = 1.0
+    pan: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def from_sensor(cls, points: ArrayLike) -> Self:
@@ -59,22 +61,27 @@ class ViewCamera(NamedTuple):
         x, y, z = (float(value) for value in centre)
         return cls((x, y, z), max(float(np.linalg.norm(centre)), 0.05), extent)
 
+    def axes(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return right, down and forward, unit vectors (3,), of an eye at azimuth 0 and elevation 0."""
+        return _ray_frame(np.asarray(self.focal_point, dtype=np.float64))
+
     def placement(self) -> Placement:
         """Return where the eye is.
 
         Raises:
             ValueError: a number is not finite, or distance, extent or zoom is not positive.
         """
-        numbers = (*self.focal_point, *self[1:])
+        numbers = (*self.focal_point, *self[1:-1], *self.pan)
         if not all(map(math.isfinite, numbers)) or min(self.distance, self.extent, self.zoom) <= 0:
             raise ValueError(f"{self} is no view: numbers must be finite; distance, extent and zoom positive")
         focal = np.asarray(self.focal_point, dtype=np.float64)
-        right, down, forward = _ray_frame(focal)
+        right, down, forward = self.axes()
         (sa, ca), (se, ce) = ((math.sin(t), math.cos(t)) for t in (self.azimuth, self.elevation))
         outward = sa * ce * right - se * down - ca * ce * forward
         up = -sa * se * right - ce * down + ca * se * forward  # ∂outward/∂elevation, so it never degenerates
         angle = 2 * math.atan(self.extent / (2 * self.distance * self.zoom))
-        return Placement(focal + self.distance * outward, focal, up, angle)
+        beside = self.pan[0] * np.cross(up, outward) + self.pan[1] * up
+        return Placement(focal + beside + self.distance * outward, focal + beside, up, angle)
 
 
 def _ray_frame(focal: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

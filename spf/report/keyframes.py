@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from spf.export.pictures import GIVEN_UP, VIEWS, encoded, hand_scene, hand_view, row_skeletons
 from spf.frame import Frame
 from spf.hand.model import Hand
+from spf.lens import seen_through
 from spf.locate import reach_of
 from spf.observation import observe
 from spf.render import Renderer, Skeleton, box_around, depth_picture
@@ -94,20 +95,22 @@ def shots(
         frame = session[int(track.frame[key.row])]
         renders: tuple[bytes, ...] = ()
         if renderer is not None:
-            scene = hand_scene(hand, track, key.row, frame)
+            scene = hand_scene(hand, track, key.row, frame, run.plan.start.shape.lens)
             views = [hand_view(track, key.row, VIEWS[side]) for side in _SIDES]
             renders = tuple(renderer.jpeg(scene, view, _SIZE, quality=85, smooth=True) for view in views)
-        yield Shot(key, _depth(hand, track, key.row, frame), renders)
+        yield Shot(key, _depth(hand, track, key.row, frame, run.plan.start.shape.lens), renders)
         if progress is not None:
             progress("Drawing the key frames", done / len(keys))
 
 
-def _depth(hand: Hand, track: Track, row: int, frame: Frame) -> bytes:
+def _depth(hand: Hand, track: Track, row: int, frame: Frame, lens: float) -> bytes:
     skeletons = row_skeletons(track, row, frame)
     if track.lost[row] and np.isfinite(track.golden[row]):  # a pose was found and not believed
         skeletons.append(Skeleton(track.joints[row], GIVEN_UP))
     box = box_around(frame.camera, np.stack([skeleton.joints for skeleton in skeletons])) if skeletons else None
-    picture = depth_picture(frame, _region(hand, track, row, frame), skeletons, box=box, width=_SIZE[0])
+    picture = depth_picture(
+        frame, _region(hand, track, row, seen_through(frame, lens)), skeletons, box=box, width=_SIZE[0]
+    )
     return encoded(picture, ".jpg")
 
 

@@ -2,6 +2,6 @@
 
 from spf.sessions.mcap_writer import MCAPWriter, write_session
 from spf.sessions.opening import FORMATS, Format, open_session
-from spf.sessions.session import Session, Side
+from spf.sessions.session import Note, Session, Side
 
-__all__ = ["FORMATS", "Format", "MCAPWriter", "Session", "Side", "open_session", "write_session"]
+__all__ = ["FORMATS", "Format", "MCAPWriter", "Note", "Session", "Side", "open_session", "write_session"]

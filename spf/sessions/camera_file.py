@@ -24,7 +24,7 @@ class FolderCamera(NamedTuple):
         fx, fy: focal lengths in pixels (orthographic: pixels per metre).
         cx, cy: principal point in pixels.
         width, height: image size in pixels; None: that of the images.
-        depth_unit: metres per count.
+        depth_unit: metres per count, None if not said.
         no_reading: counts that mean "no reading", besides 0.
         max_valid: the largest count that is a reading, None for any.
         fps: frames per second.
@@ -39,7 +39,7 @@ class FolderCamera(NamedTuple):
     cy: float
     width: int | None = None
     height: int | None = None
-    depth_unit: float = 0.001
+    depth_unit: float | None = None
     no_reading: tuple[int, ...] = ()
     max_valid: int | None = None
     fps: float = 30.0
@@ -49,7 +49,7 @@ class FolderCamera(NamedTuple):
 
     @classmethod
     def of(cls, camera: Camera) -> FolderCamera:
-        """Return what is known when only a camera is given: millimetres at 30 frames per second."""
+        """Return what is known when only a camera is given: no depth unit, 30 frames per second."""
         return cls(camera.fx, camera.fy, camera.cx, camera.cy, camera.width, camera.height, model=camera.model)
 
     def camera(self, width: int, height: int) -> Camera:

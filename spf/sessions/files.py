@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from spf.errors import SessionError
 from spf.frame import Truth
+from spf.sessions.jpeg import read_jpeg
 from spf.sessions.png import png_header, read_colour_png
 from spf.sessions.session import Session
 
@@ -61,7 +62,9 @@ class FileSession(Session):
     def colour(self, index: int) -> NDArray[np.uint8] | None:
         """Return the (H, W, 3) RGB image of a frame, or None."""
         path = self.colour_paths[index] if self.colour_paths else None
-        return None if path is None else read_colour_png(path)
+        if path is None:
+            return None
+        return read_jpeg(path) if path.suffix.lower() in (".jpg", ".jpeg") else read_colour_png(path)
 
     def truth(self, index: int) -> Truth | None:
         """Return the true joints of a frame, or None."""
@@ -158,12 +161,14 @@ def check_depth_unit(session: Session) -> None:
     if not readings.size:
         raise SessionError(
             f"{session.uri} has no depth reading in the {len(looked_at)} frames looked at: "
-            f"either the sensor saw nothing or the depth is not in counts of {session.depth_unit:g} m."
+            f"either the sensor saw nothing or the depth is in the wrong unit (not in counts of {session.depth_unit:g} m): "
+            "set depth_unit, or unit= behind the ?, to the metres of one count."
         )
     median = float(np.median(readings)) * session.depth_unit
     low, high = _BELIEVABLE_DEPTH
     if not low <= median <= high:
         raise SessionError(
             f"{session.uri} has depth in the wrong unit: with {session.depth_unit:g} m a count its median depth is "
-            f"{median:.3g} m, and {low:g} to {high:g} m is believable; set depth_unit to the metres of one count."
+            f"{median:.3g} m, and {low:g} to {high:g} m is believable; set depth_unit, or unit= behind the ?, "
+            "to the metres of one count."
         )

@@ -18,6 +18,7 @@ from spf.sessions.mcap_messages import (
     DEPTH_TOPIC,
     FREE_RECORD,
     JOINTS_TOPIC,
+    NOTES_TOPIC,
     ORIENTATION_TOPIC,
     POSE_TOPIC,
     SESSION_RECORD,
@@ -26,8 +27,9 @@ from spf.sessions.mcap_messages import (
     decode_camera,
     decode_image,
     decode_joints,
+    decode_note,
 )
-from spf.sessions.session import Session
+from spf.sessions.session import Note, Session
 
 __all__ = ["McapSession", "is_mcap", "open_mcap"]
 
@@ -94,7 +96,6 @@ def open_mcap(path: Path) -> Session:
         why = "was torn before its first frame was complete" if not index.whole else "holds no frame"
         raise SessionError(f"{path} {why}: record it again.")
     description = _describe(path, index)
-    warnings = () if index.whole else (f"{path.name} was torn: {len(stamps)} complete frames were recovered.",)
     return McapSession(
         uri=str(path),
         name=path.stem,
@@ -108,11 +109,32 @@ def open_mcap(path: Path) -> Session:
         hand_shape=description.hand_shape,
         start_time_ns=description.start_time_ns and stamps[0],
         metadata=index.metadata.get(FREE_RECORD, {}),
-        warnings=warnings,
+        notes=_read_notes(path, index, stamps[0]),
+        warnings=() if index.whole else (_what_was_lost(path, index, len(stamps)),),
         path=path,
         index=index,
         stamps=stamps,
     )
+
+
+def _what_was_lost(path: Path, index: McapIndex, frames: int) -> str:
+    """Say what of a torn file was recovered, and what was not."""
+    lost = []
+    if index.damaged:
+        lost.append(f"{index.damaged} damaged stretch{'es' if index.damaged > 1 else ''} in the middle")
+    if index.lost_bytes:
+        lost.append(f"the last {index.lost_bytes} bytes, an incomplete record,")
+    told = f"; {' and '.join(lost)} could not be read" if lost else " and nothing but its index is missing"
+    return (
+        f"{path.name} was torn: {frames} complete frames were recovered{told}. "
+        f"'spf convert {path.name} OUT.mcap' writes a whole file."
+    )
+
+
+def _read_notes(path: Path, index: McapIndex, first: int) -> tuple[Note, ...]:
+    stamps = sorted(index.places.get(NOTES_TOPIC, {}))
+    read = ((stamp, *decode_note(read_message(path, index, NOTES_TOPIC, stamp))) for stamp in stamps)
+    return tuple(Note((stamp - first) / 1e9, kind, text) for stamp, kind, text in read)
 
 
 def _describe(path: Path, index: McapIndex) -> Description:

@@ -28,6 +28,9 @@ _DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowErr
 
 _RECORD = struct.Struct("<BQ")
 _FOOTER = struct.Struct("<BQQQI")
+_CHUNK_SIGN = b"\x04\0\0\0zstd"  # in the header of a chunk, behind its opcode, length, times, size and checksum
+_SIGN_OFFSET = _RECORD.size + 3 * 8 + 4
+_BLOCK = 1 << 16  # bytes read at once while the next chunk is looked for
 
 
 class Place(NamedTuple):
@@ -44,11 +47,15 @@ class McapIndex(NamedTuple):
         places: topic → log time in ns → place.
         metadata: name → metadata record.
         whole: whether the file was finished by its writer.
+        damaged: stretches of a torn file that could not be read and were left out, the end not counted.
+        lost_bytes: bytes at the end of a torn file that are no complete record.
     """
 
     places: dict[str, dict[int, Place]]
     metadata: dict[str, dict[str, str]]
     whole: bool
+    damaged: int = 0
+    lost_bytes: int = 0
 
 
 def has_magic(path: Path) -> bool:
@@ -102,6 +109,14 @@ def _records(file: BinaryIO, offset: int) -> Iterator[tuple[int, int, bytes]]:
         offset += _RECORD.size + length
 
 
+def _record_at(file: BinaryIO, offset: int) -> bytes:
+    """Return the content of the record at an offset; an index may name one behind the end."""
+    record = next(_records(file, offset), None)
+    if record is None:
+        raise ValueError(offset)
+    return record[2]
+
+
 def _stream(content: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(content))
 
@@ -130,7 +145,7 @@ def _from_summary(file: BinaryIO) -> McapIndex | None:
             for channel, time in _messages_of(file, chunk):
                 places[topics[channel]][time] = Place(chunk.chunk_start_offset, channel)
     entries = [MetadataIndex.read(_stream(content)) for opcode, content in records if opcode == Opcode.METADATA_INDEX]
-    found = [Metadata.read(_stream(next(_records(file, entry.offset))[2])) for entry in entries]
+    found = [Metadata.read(_stream(_record_at(file, entry.offset))) for entry in entries]
     return McapIndex(places, {record.name: record.metadata for record in found}, whole=True)
 
 
@@ -140,26 +155,58 @@ def _messages_of(file: BinaryIO, chunk: ChunkIndex) -> Iterator[tuple[int, int]]
         yield next(iter(chunk.message_index_offsets)), chunk.message_start_time
         return
     for offset in chunk.message_index_offsets.values():
-        index = MessageIndex.read(_stream(next(_records(file, offset))[2]))
+        index = MessageIndex.read(_stream(_record_at(file, offset)))
         yield from ((index.channel_id, time) for time, _ in index.records)
 
 
 def _from_walk(file: BinaryIO) -> McapIndex:
-    topics: dict[int, str] = {}
-    index = McapIndex({}, {}, whole=False)
-    try:
-        for opcode, offset, content in _records(file, len(MCAP0_MAGIC)):
-            if opcode == Opcode.METADATA:
-                record = Metadata.read(_stream(content))
-                index.metadata[record.name] = record.metadata
-            elif opcode == Opcode.CHUNK:
-                channels, messages = _open_chunk(content)
-                topics.update(channels)
-                for message in messages:
-                    places = index.places.setdefault(topics[message.channel_id], {})
-                    places[message.log_time] = Place(offset, message.channel_id)
-            elif opcode == Opcode.FOOTER:
-                return index._replace(whole=file.read() == MCAP0_MAGIC)
-    except _DAMAGE:
-        return index  # nothing behind the damage can be trusted
-    return index
+    """Find all messages that are whole, over damaged stretches: what stands behind one is checked on its own."""
+    size = file.seek(0, 2)
+    index, topics = McapIndex({}, {}, whole=False), dict[int, str]()
+    begin: int | None = len(MCAP0_MAGIC)
+    while begin is not None:
+        offset = begin
+        for opcode, start, content in _records(file, begin):
+            offset = start
+            if opcode == Opcode.FOOTER:
+                return index._replace(whole=file.read() == MCAP0_MAGIC and not index.damaged)
+            try:
+                _take(index, topics, opcode, start, content)
+            except _DAMAGE:
+                break
+            offset = start + _RECORD.size + len(content)
+        begin = _next_chunk(file, offset + 1)
+        if begin is not None:
+            index = index._replace(damaged=index.damaged + 1)
+    return index._replace(lost_bytes=size - offset)
+
+
+def _take(index: McapIndex, topics: dict[int, str], opcode: int, offset: int, content: bytes) -> None:
+    """Add what a record holds."""
+    if opcode == Opcode.METADATA:
+        record = Metadata.read(_stream(content))
+        index.metadata[record.name] = record.metadata
+    elif opcode == Opcode.CHUNK:
+        channels, messages = _open_chunk(content)
+        topics.update(channels)
+        for message in messages:
+            places = index.places.setdefault(topics[message.channel_id], {})
+            places[message.log_time] = Place(offset, message.channel_id)
+    elif not Opcode.HEADER <= opcode <= Opcode.DATA_END:
+        raise ValueError(opcode)
+
+
+def _next_chunk(file: BinaryIO, offset: int) -> int | None:
+    """Return where the next chunk after a damaged stretch begins: they all name their compression at the same place."""
+    position, kept = offset, b""
+    file.seek(position)
+    while block := file.read(_BLOCK):
+        data = kept + block
+        found = data.find(_CHUNK_SIGN, _SIGN_OFFSET)
+        while found >= 0:
+            if data[found - _SIGN_OFFSET] == Opcode.CHUNK:
+                return position - len(kept) + found - _SIGN_OFFSET
+            found = data.find(_CHUNK_SIGN, found + 1)
+        position += len(block)
+        kept = data[-(_SIGN_OFFSET + len(_CHUNK_SIGN)) :]
+    return None

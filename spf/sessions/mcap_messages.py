@@ -26,6 +26,7 @@ __all__ = [
     "FREE_RECORD",
     "JOINTS_TOPIC",
     "MESSAGE_TYPES",
+    "NOTES_TOPIC",
     "ORIENTATION_TOPIC",
     "POSE_TOPIC",
     "SESSION_RECORD",
@@ -34,11 +35,13 @@ __all__ = [
     "decode_camera",
     "decode_image",
     "decode_joints",
+    "decode_note",
     "definition",
     "encode_array",
     "encode_camera",
     "encode_image",
     "encode_joints",
+    "encode_note",
 ]
 
 DEPTH_TOPIC = "/depth/image_rect_raw"
@@ -47,11 +50,14 @@ COLOUR_TOPIC = "/color/image_rect"
 JOINTS_TOPIC = "/truth/joints"
 POSE_TOPIC = "/truth/pose"
 ORIENTATION_TOPIC = "/truth/orientation"
+NOTES_TOPIC = "/notes"
 
 _IMAGE = "sensor_msgs/msg/Image"
 _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 _POSE_ARRAY = "geometry_msgs/msg/PoseArray"
 _MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+_LOG = "rcl_interfaces/msg/Log"  # what Foxglove and ROS 2 list as a log
+_INFO = 20
 
 #: The message type of each topic.
 MESSAGE_TYPES = {
@@ -61,6 +67,7 @@ MESSAGE_TYPES = {
     JOINTS_TOPIC: _POSE_ARRAY,
     POSE_TOPIC: _MULTI_ARRAY,
     ORIENTATION_TOPIC: _MULTI_ARRAY,
+    NOTES_TOPIC: _LOG,
 }
 
 #: The metadata records: what the format defines, and whatever else the writer was told.
@@ -228,6 +235,18 @@ def decode_joints(data: bytes) -> NDArray[np.float64]:
     """Decode (J, 3) joints in metres."""
     positions = [pose.position for pose in _decode(data, _POSE_ARRAY).poses]
     return np.array([(point.x, point.y, point.z) for point in positions], dtype=np.float64).reshape(-1, 3)
+
+
+def encode_note(kind: str, text: str, stamp_ns: int) -> bytes:
+    """Encode a marker, note or event as a log entry of that name."""
+    stamp = _make("builtin_interfaces/msg/Time", sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9)
+    return _encode(_make(_LOG, stamp=stamp, level=_INFO, name=kind, msg=text, file="", function="", line=0))
+
+
+def decode_note(data: bytes) -> tuple[str, str]:
+    """Decode (kind, text)."""
+    message = _decode(data, _LOG)
+    return str(message.name), str(message.msg)
 
 
 def encode_array(array: NDArray[np.float64]) -> bytes:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,7 +14,7 @@ from mcap.writer import Writer
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
-from spf.frame import JOINT_NAMES, Camera, Frame
+from spf.frame import JOINT_NAMES, Camera, Frame, Truth
 from spf.sessions.mcap_messages import (
     CAMERA_TOPIC,
     COLOUR_TOPIC,
@@ -21,6 +22,7 @@ from spf.sessions.mcap_messages import (
     FREE_RECORD,
     JOINTS_TOPIC,
     MESSAGE_TYPES,
+    NOTES_TOPIC,
     ORIENTATION_TOPIC,
     POSE_TOPIC,
     SESSION_RECORD,
@@ -30,8 +32,9 @@ from spf.sessions.mcap_messages import (
     encode_camera,
     encode_image,
     encode_joints,
+    encode_note,
 )
-from spf.sessions.session import Session, Side
+from spf.sessions.session import Note, Session, Side
 
 __all__ = ["MCAPWriter", "write_session"]
 
@@ -77,17 +80,21 @@ class MCAPWriter:
         self._start = start_time_ns
         self._count = 0
         self._last: int | None = None
+        self._last_note = -1
+        self._ended = False
         self._last_camera: int | None = None
         self._channels: dict[str, int] = {}
         free = dict(metadata or {})
         description = Description(depth_unit, side, joint_definition, hand_shape, start_time_ns, camera.model)
         record = description.to_record(free)
         self._file = _create(self.path, overwrite)
+        self._whole = 0
         # A chunk is closed when it is larger than this: one chunk a message.
         self._mcap = Writer(self._file, chunk_size=1)
-        self._mcap.start(profile="ros2")
-        self._mcap.add_metadata(SESSION_RECORD, record)
-        self._mcap.add_metadata(FREE_RECORD, free)
+        with self._whole_records():
+            self._mcap.start(profile="ros2")
+            self._mcap.add_metadata(SESSION_RECORD, record)
+            self._mcap.add_metadata(FREE_RECORD, free)
 
     def write(self, frame: Frame) -> None:
         """Append a frame; its depth is rounded to whole counts, its index is not stored.
@@ -96,28 +103,95 @@ class MCAPWriter:
             SessionError: its time is not after the last one's, its camera is another, its depth does not fit into
                 uint16 counts, or the disk is full.
         """
-        stamp = self._start + round(frame.time * 1e9)
-        self._check(frame, stamp)
-        raw = self._counts(frame)
+        if frame.camera != self.camera or frame.depth.shape != (self.camera.height, self.camera.width):
+            raise SessionError(f"Frame {self._count} was taken by another camera than the session {self.path.name}.")
+        if frame.truth is not None and frame.truth.joints.shape != (len(JOINT_NAMES), 3):
+            raise SessionError(f"The truth of frame {self._count} has {len(frame.truth.joints)} joints, not 21.")
+        self._append(round(frame.time * 1e9), self._counts(frame), frame.colour, frame.truth)
+
+    def write_raw(self, time_ns: int, raw: NDArray[np.uint16], colour: NDArray[np.uint8] | None = None) -> None:
+        """Append a frame as a sensor delivers it.
+
+        Args:
+            time_ns: nanoseconds since ``start_time_ns``, later than the last frame's.
+            raw: (H, W) depth counts, 0 where there is no reading.
+            colour: (H, W, 3) RGB, registered to the depth.
+
+        Raises:
+            SessionError: its time is not after the last one's, its size is another, or the disk is full.
+        """
+        if raw.shape != (self.camera.height, self.camera.width):
+            raise SessionError(f"Frame {self._count} has another size than the session {self.path.name}.")
+        self._append(time_ns, raw, colour, None)
+
+    def add_note(self, note: Note) -> None:
+        """Append a marker, a note or an event; its time counts from ``start_time_ns``, like that of frames.
+
+        Raises:
+            SessionError: the disk is full.
+        """
+        stamp = max(self._start + round(note.time * 1e9), self._last_note + 1, 0)
+        with self._whole_records():
+            self._add(NOTES_TOPIC, stamp, encode_note(note.kind, note.text, stamp))
+        self._last_note = stamp
+
+    def sync(self) -> None:
+        """Have the system put what was written onto the disk, where it outlives a power cut.
+
+        Raises:
+            SessionError: the disk is full or gone.
+        """
         try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def _append(
+        self, time_ns: int, raw: NDArray[np.uint16], colour: NDArray[np.uint8] | None, truth: Truth | None
+    ) -> None:
+        stamp = self._start + time_ns
+        if stamp < 0 or (self._last is not None and stamp <= self._last):
+            raise SessionError(f"Frame {self._count} at {time_ns / 1e9} s is not later than the one before it.")
+        with self._whole_records():
             if self._last_camera is None or stamp - self._last_camera >= _CAMERA_EVERY_NS:
                 self._add(CAMERA_TOPIC, stamp, encode_camera(self.camera, stamp))
                 self._last_camera = stamp
-            if frame.colour is not None:
-                self._add(COLOUR_TOPIC, stamp, encode_image(frame.colour, stamp))
-            if frame.truth is not None:
-                self._add(JOINTS_TOPIC, stamp, encode_joints(frame.truth.joints, stamp))
-                if frame.truth.pose is not None:
-                    self._add(POSE_TOPIC, stamp, encode_array(frame.truth.pose))
-                if frame.truth.orientation is not None:
-                    self._add(ORIENTATION_TOPIC, stamp, encode_array(frame.truth.orientation))
+            if colour is not None:
+                self._add(COLOUR_TOPIC, stamp, encode_image(colour, stamp))
+            if truth is not None:
+                self._add(JOINTS_TOPIC, stamp, encode_joints(truth.joints, stamp))
+                if truth.pose is not None:
+                    self._add(POSE_TOPIC, stamp, encode_array(truth.pose))
+                if truth.orientation is not None:
+                    self._add(ORIENTATION_TOPIC, stamp, encode_array(truth.orientation))
             # Last, so that a frame that has its depth has everything.
             self._add(DEPTH_TOPIC, stamp, encode_image(raw, stamp))
-            self._file.flush()
-        except OSError as error:
-            raise SessionError(f"{self.path} cannot be written: {error.strerror}.") from error
         self._last = stamp
         self._count += 1
+
+    @contextmanager
+    def _whole_records(self) -> Iterator[None]:
+        """Put what is written inside into the file; when that fails, cut the file where it was whole, and end it there."""
+        try:
+            yield
+            self._file.flush()
+            self._whole = self._file.tell()
+        except OSError as error:
+            self._abandon()
+            raise self._unwritable(error) from error
+
+    def _abandon(self) -> None:
+        """Close the file without its index, at its last whole frame: what is there opens with all frames written."""
+        self._ended = True
+        with suppress(OSError):  # the buffer that could not be written is tried once more when the file is closed
+            self._file.close()
+        if self.path.is_file():  # no device
+            os.truncate(self.path, self._whole)
+
+    def _unwritable(self, error: OSError) -> SessionError:
+        return SessionError(
+            f"{self.path} cannot be written: {error.strerror}. The {self._count} frames before are safe in it."
+        )
 
     def close(self) -> None:
         """Write the index and close the file.
@@ -125,13 +199,15 @@ class MCAPWriter:
         Raises:
             SessionError: the disk is full.
         """
-        if self._file.closed:
+        if self._ended:
             return
+        self._ended = True
         try:
             with self._file:
                 self._mcap.finish()
         except OSError as error:
-            raise SessionError(f"{self.path} cannot be written: {error.strerror}.") from error
+            self._abandon()
+            raise self._unwritable(error) from error
 
     def __enter__(self) -> Self:
         return self
@@ -145,13 +221,10 @@ class MCAPWriter:
         """Return the number of frames written."""
         return self._count
 
-    def _check(self, frame: Frame, stamp: int) -> None:
-        if stamp < 0 or (self._last is not None and stamp <= self._last):
-            raise SessionError(f"Frame {self._count} at {frame.time} s is not later than the one before it.")
-        if frame.camera != self.camera or frame.depth.shape != (self.camera.height, self.camera.width):
-            raise SessionError(f"Frame {self._count} was taken by another camera than the session {self.path.name}.")
-        if frame.truth is not None and frame.truth.joints.shape != (len(JOINT_NAMES), 3):
-            raise SessionError(f"The truth of frame {self._count} has {len(frame.truth.joints)} joints, not 21.")
+    @property
+    def size(self) -> int:
+        """Bytes in the file until the last whole frame."""
+        return self._whole
 
     def _counts(self, frame: Frame) -> NDArray[np.uint16]:
         counts = np.rint(frame.depth / self.depth_unit)
@@ -205,6 +278,8 @@ def write_session(
     )
     try:
         with writer:
+            for note in session.notes:
+                writer.add_note(note)
             for done, frame in enumerate(session, 1):
                 writer.write(frame)
                 if progress is not None:

@@ -80,7 +80,8 @@ def _read_depth(path: Path) -> NDArray[np.uint16]:
     if not inside or len(data) != 24 + 4 * box[0] * box[1]:
         raise torn
     depth_mm = np.frombuffer(data, "<f4", offset=24).reshape(box)
-    counts = np.rint(np.nan_to_num(depth_mm, nan=0.0) * _COUNTS_PER_MM)
+    with np.errstate(over="ignore"):  # a damaged number: infinite is no reading either
+        counts = np.rint(np.nan_to_num(depth_mm, nan=0.0) * _COUNTS_PER_MM)
     raw = np.zeros((height, width), np.uint16)
     raw[top:bottom, left:right] = np.where((counts > 0) & (counts <= _MOST), counts, 0).astype(np.uint16)
     return raw

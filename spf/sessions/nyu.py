@@ -9,13 +9,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
 from spf.frame import JOINT_NAMES, Camera
 from spf.sessions.files import FileSession, check_depth_unit, check_png_sizes, list_files, steady_times
 from spf.sessions.joint_order import arrange_joints
+from spf.sessions.mat_file import read_mat_array
 from spf.sessions.png import read_packed_depth_png
 from spf.sessions.session import Session
 
@@ -80,13 +80,12 @@ def _names() -> list[str | None]:
 def _read_joints(path: Path, numbers: list[int]) -> tuple[NDArray[np.float64] | None, tuple[str, ...]]:
     if not path.is_file():
         return None, ("There is no joint_data.mat in the folder, so there is no truth.",)
-    try:
-        xyz_mm = np.asarray(scipy.io.loadmat(path, variable_names=["joint_xyz"])["joint_xyz"][0], dtype=np.float64)
-    except Exception as error:  # scipy's reader raises nearly anything on a torn file
-        raise SessionError(f"The file {path} is damaged or holds no joint_xyz: copy it again.") from error
+    xyz_mm = read_mat_array(path, "joint_xyz")
+    xyz_mm = xyz_mm[0] if len(xyz_mm) else xyz_mm
     if xyz_mm.ndim != 3 or xyz_mm.shape[1:] != (_MARK_COUNT, 3):
         raise SessionError(f"The file {path} holds no joint_xyz of 36 joints a frame: copy it again.")
-    xyz = xyz_mm * np.array([1e-3, -1e-3, 1e-3])  # y points up there
+    with np.errstate(invalid="ignore"):  # a damaged number stays none
+        xyz = xyz_mm * np.array([1e-3, -1e-3, 1e-3])  # y points up there
     listed = arrange_joints(xyz, _names())
     listed[:, JOINT_NAMES.index("wrist")] = (xyz[:, _PALM_1] + xyz[:, _PALM_2]) / 2
     joints = np.full((len(numbers), len(JOINT_NAMES), 3), np.nan)

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from spf.errors import SessionError
 
-__all__ = ["PngHeader", "png_header", "read_colour_png", "read_depth_png", "read_packed_depth_png"]
+__all__ = ["PngHeader", "decode_depth_png", "png_header", "read_colour_png", "read_depth_png", "read_packed_depth_png"]
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _RGB = 0, 2
+_MOST_PIXELS = 2**26  # of an image; a header that says more is damaged, and OpenCV would take the memory for it
 _KINDS = {0: "grey", 2: "colour", 3: "palette", 4: "grey with alpha", 6: "colour with alpha"}
 
 
@@ -62,6 +63,23 @@ def read_depth_png(path: Path) -> NDArray[np.uint16]:
     return raw
 
 
+def decode_depth_png(data: bytes, name: str) -> NDArray[np.uint16]:
+    """Decode the bytes of a 16-bit grey PNG.
+
+    Args:
+        data: of the image.
+        name: of the image, for messages.
+
+    Returns:
+        (H, W) raw counts.
+
+    Raises:
+        SessionError: it is torn, or no 16-bit grey PNG.
+    """
+    raw: NDArray[np.uint16] = _decode_bytes(data, name, bits=16, kind=_GREY, wanted="a 16-bit grey PNG")
+    return raw
+
+
 def read_packed_depth_png(path: Path) -> NDArray[np.uint16]:
     """Read depth packed in an 8-bit colour PNG: high byte in green, low byte in blue (NYU).
 
@@ -98,12 +116,16 @@ def _read(path: Path, size: int = -1) -> bytes:
         raise SessionError(f"The image {path} cannot be read: {error.strerror}.") from error
 
 
-def _header(data: bytes, path: Path) -> PngHeader:
+def _header(data: bytes, name: object) -> PngHeader:
     if not data:
-        raise SessionError(f"The image {path} is empty (0 bytes): copy it again, or take it out of the folder.")
+        raise SessionError(f"The image {name} is empty (0 bytes): copy it again, or take it out of the folder.")
     if not data.startswith(_SIGNATURE) or len(data) < 33:
-        raise SessionError(f"The file {path} is not a PNG image: copy it again, or take it out of the folder.")
+        raise SessionError(f"The file {name} is not a PNG image: copy it again, or take it out of the folder.")
     width, height, bits, kind = struct.unpack(">IIBB", data[16:26])
+    if width * height > _MOST_PIXELS:
+        raise SessionError(
+            f"The image {name} says that it is {width}×{height}, which no depth image is: copy it again."
+        )
     return PngHeader(width, height, bits, kind)
 
 
@@ -121,11 +143,14 @@ def _is_whole(data: bytes) -> bool:
 
 
 def _decode(path: Path, bits: int, kind: int, wanted: str) -> NDArray[Any]:
-    data = _read(path)
-    header = _header(data, path)
+    return _decode_bytes(_read(path), path, bits, kind, wanted)
+
+
+def _decode_bytes(data: bytes, name: object, bits: int, kind: int, wanted: str) -> NDArray[Any]:
+    header = _header(data, name)
     if (header.bits, header.kind) != (bits, kind):
-        raise SessionError(f"The image {path} is a {header}, not {wanted}.")
+        raise SessionError(f"The image {name} is a {header}, not {wanted}.")
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if _is_whole(data) else None
     if image is None:
-        raise SessionError(f"The image {path} is torn: copy it again, or take it out of the folder.")
+        raise SessionError(f"The image {name} is torn: copy it again, or take it out of the folder.")
     return image

@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
-from spf.frame import Camera
 from spf.sessions.camera_file import EXAMPLE, FolderCamera, read_camera_file
+from spf.sessions.choice import Choice
 from spf.sessions.files import FileSession, check_depth_unit, check_png_sizes, list_files, steady_times
 from spf.sessions.png import png_header, read_depth_png
 from spf.sessions.session import Session
 
-__all__ = ["is_png_folder", "open_png_folder"]
+__all__ = ["folder_camera", "is_png_folder", "open_png_folder"]
 
 _IMAGES = r".+\.png"
+_UNIT = 0.001  # metres per count where the camera file does not say it
 
 
 def is_png_folder(path: Path) -> bool:
@@ -25,12 +26,13 @@ def is_png_folder(path: Path) -> bool:
     return path.is_dir() and bool(list_files(path, _IMAGES))
 
 
-def open_png_folder(path: Path, camera: Camera | Path | None = None) -> Session:
+def open_png_folder(path: Path, choice: Choice, uri: str) -> Session:
     """Open a folder of 16-bit depth PNGs, in the natural order of their names.
 
     Args:
         path: the folder.
-        camera: the camera or a camera file outside the folder; None: ``camera.json`` in the folder.
+        choice: a camera, else ``camera.json`` in the folder tells it; a depth unit.
+        uri: of the session.
 
     Raises:
         SessionError: there is no camera file, it or an image is damaged, images differ in size, or the depth is in
@@ -39,20 +41,15 @@ def open_png_folder(path: Path, camera: Camera | Path | None = None) -> Session:
     paths = tuple(list_files(path, _IMAGES))
     check_png_sizes(paths)
     header = png_header(paths[0])
-    given = _camera(path, camera)
-    width, height = given.width or header.width, given.height or header.height
-    if (width, height) != (header.width, header.height):
-        raise SessionError(
-            f"The images in {path} are {header.width}×{header.height}, but the camera given is {width}×{height}: "
-            "give the width, height and focal lengths of the images."
-        )
+    given = choice.camera or folder_camera(path)
+    camera = choice._replace(camera=given).fitting((header.width, header.height), uri)
     session = FileSession(
-        uri=str(path),
+        uri=uri,
         name=path.resolve().name,
         format="png-folder",
-        camera=given.camera(width, height),
+        camera=camera,
         times_ns=steady_times(range(len(paths)), given.fps),
-        depth_unit=given.depth_unit,
+        depth_unit=choice.unit or given.depth_unit or _UNIT,
         side=given.side,
         metadata={"sensor": given.sensor} if given.sensor else {},
         depth_paths=paths,
@@ -62,10 +59,13 @@ def open_png_folder(path: Path, camera: Camera | Path | None = None) -> Session:
     return session
 
 
-def _camera(folder: Path, camera: Camera | Path | None) -> FolderCamera:
-    if isinstance(camera, Camera):
-        return FolderCamera.of(camera)
-    file = camera or folder / "camera.json"
+def folder_camera(folder: Path) -> FolderCamera:
+    """Read the camera file in a folder.
+
+    Raises:
+        SessionError: there is none, or it is damaged.
+    """
+    file = folder / "camera.json"
     if not file.is_file():
         raise SessionError(
             f"There is no camera file {file}: write one like {EXAMPLE} (pixels, and metres per count), or give one."

@@ -10,16 +10,30 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Camera, Frame, Truth
 
-__all__ = ["Session", "Side"]
+__all__ = ["Note", "Session", "Side"]
 
 Side = Literal["left", "right"]
+
+
+class Note(NamedTuple):
+    """Something said of an instant of a recording.
+
+    Attributes:
+        time: seconds since the session's first frame.
+        kind: ``"marker"`` or ``"note"`` by a person, ``"event"`` by the program (a sensor lost, frames not recorded).
+        text: what is said; may be empty for a marker.
+    """
+
+    time: float
+    kind: str
+    text: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +55,8 @@ class Session(ABC):
         hand_shape: the exact hand shape of a synthetic session, ready for JSON, else None.
         start_time_ns: nanoseconds since 1970 (UTC) of the first frame, 0 where unknown.
         metadata: whatever else is known, as text (``sensor``, ``dataset``, …).
+        contents: one line for everything that its file holds, for people (topics, tracks, arrays).
+        notes: markers and notes made while it was recorded, by time.
         warnings: one sentence for everything that a user should know of how it was read.
     """
 
@@ -56,6 +72,8 @@ class Session(ABC):
     hand_shape: dict[str, Any] | None = None
     start_time_ns: int = 0
     metadata: Mapping[str, str] = field(default_factory=dict)
+    contents: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @abstractmethod

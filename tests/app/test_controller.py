@@ -151,11 +151,11 @@ def test_a_missing_file_is_one_sentence(page, sample, act, choice):
 def test_a_tracked_frame_makes_three_scenes_under_one_view_and_a_depth_jpeg(page, sample, act):
     state, controller = page
     started(state, controller, sample, act)
-    scenes = {name: scene(state.entry) for name, scene in SCENES.items()}
+    scenes = {name: scene(state.entry, ()) for name, scene in SCENES.items()}
     assert len(scenes["particles"].meshes) == 8
     assert len(scenes["reconstruction"].meshes) == 1
     assert scenes["trajectories"].lines[0].paths.shape[0] == 4 * 6
-    assert isinstance(view_of([state.entry], 0.1, 0.2, 1.5), ViewCamera)
+    assert isinstance(view_of([state.entry], state), ViewCamera)
     frame = state.session[0]
     plain = depth_jpeg(frame)
     full = depth_jpeg(frame, state.entry.seen, [Skeleton(state.summary.joints, (255, 255, 255))])

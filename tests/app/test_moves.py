@@ -28,8 +28,9 @@ def state(sample):
         lost = i in LOST
         nan = float("nan")
         state.lane.results._summaries[i] = Summary(
-            i, np.zeros((21, 3)), lost, i in (4, 7), nan, nan if lost else error / 10, nan, error / 1000, 0.1, None
-        )
+            i, np.zeros((21, 3)), lost, i in (4, 7), nan, nan, False, "", nan if lost else error / 10, nan,
+            error / 1000, 0.1, None,
+        )  # fmt: skip
     return state
 
 

@@ -195,3 +195,29 @@ def test_results_copied_grow_apart(kept):
     other.cut(4)
     assert isinstance(other, Results)
     assert (other.last, state.lane.results.last) == (3, 23)
+
+
+def test_a_run_that_cannot_be_kept_is_not_dropped(shelf, sample, tmp_path):
+    state, controller, reruns = new_page(shelf)
+
+    async def scene():
+        await controller.open(sample)
+        state.change("rounds", 1)
+        state.change("learned", False)
+        await controller.start()
+        shelf.folder.write_text("a file is where the runs should be")
+        await controller.step()
+        held = state.lane.results
+        for act in (reruns.rerun, reruns.again, controller.restart, lambda: controller.open(sample), controller.start):
+            await act()
+            assert state.lane.results is held
+            assert held.last == 1
+            assert "make it writable" in state.error
+        shelf.folder.unlink()
+        await reruns.rerun()
+        assert state.error == ""
+        assert len(shelf.runs()) == 1
+        assert state.lane.results is not held
+
+    asyncio.run(scene())
+    controller.close()

@@ -12,7 +12,7 @@ import pytest
 from spf import __version__
 from spf.cli import execute
 from spf.runs import read_run
-from spf.sessions import open_session, write_session
+from spf.sessions import MCAPWriter, Note, open_session, write_session
 from spf.synthetic import SyntheticSettings, synthesise
 
 
@@ -154,3 +154,36 @@ def test_doctor(monkeypatch, capsys):
     monkeypatch.setattr(results, "examine", lambda: (Check("Sun", False, "none", "wait"),))
     assert execute(["doctor", "--json"]) == 1
     assert json.loads(capsys.readouterr().out)[0]["advice"] == "wait"
+
+
+def test_trim_and_split_keep_every_frame_exactly(tmp_path, capsys):
+    whole, middle = tmp_path / "whole.mcap", tmp_path / "middle.mcap"
+    session = synthesise(SyntheticSettings(frames=8, seed=3))
+    options = {"camera": session.camera, "depth_unit": session.depth_unit, "side": "right", "start_time_ns": 10**18}
+    with MCAPWriter(whole, **options) as writer:
+        for frame in session:
+            writer.write(frame)
+        writer.add_note(Note(session.times[1], "marker", "early"))
+        writer.add_note(Note(session.times[4], "note", "here"))
+    source = open_session(whole)
+    assert execute(["trim", str(whole), "3:6", str(middle)]) == 0
+    assert execute(["split", str(whole), str(tmp_path / "part.mcap"), "--at", "2,5"]) == 0
+    parts = [open_session(tmp_path / f"part-{number}.mcap") for number in (1, 2, 3)]
+    assert [len(part) for part in parts] == [2, 3, 3]
+    for first, part in [(3, open_session(middle)), (0, parts[0]), (2, parts[1]), (5, parts[2])]:
+        assert (part.camera, part.side, part.depth_unit) == (source.camera, "right", source.depth_unit)
+        assert part.start_time_ns == source.start_time_ns + source.times_ns[first]
+        np.testing.assert_array_equal(
+            part.times_ns, source.times_ns[first : first + len(part)] - source.times_ns[first]
+        )
+        for index in range(len(part)):
+            np.testing.assert_array_equal(part.raw_depth(index), source.raw_depth(first + index))
+            np.testing.assert_array_equal(part.truth(index).joints, source.truth(first + index).joints)
+    assert [(note.kind, note.text) for note in open_session(middle).notes] == [("note", "here")]
+    assert open_session(middle).notes[0].time == pytest.approx(source.times[4] - source.times[3])
+    capsys.readouterr()
+    for wrong in (["trim", str(whole), "5:99", str(tmp_path / "x.mcap")], ["trim", str(whole), "1:2", str(middle)]):
+        assert execute(wrong) == 2
+    for at in ("0", "8", "5,2", "x"):
+        assert execute(["split", str(whole), str(tmp_path / "x.mcap"), "--at", at]) == 2
+    assert not list(tmp_path.glob("x*"))

@@ -11,7 +11,12 @@ import pytest
 from spf.errors import SessionError
 from spf.frame import Camera
 from spf.sessions import FORMATS, Session, open_session, write_session
-from tests.sessions.makers import MAKERS, Made
+from tests.sessions.file_makers import FILE_MAKERS
+from tests.sessions.makers import MAKERS as OWN_MAKERS
+from tests.sessions.makers import Made
+from tests.sessions.ros_makers import ROS_MAKERS
+
+MAKERS = {**OWN_MAKERS, **ROS_MAKERS, **FILE_MAKERS}
 
 
 @pytest.fixture(params=sorted(MAKERS))
@@ -133,8 +138,12 @@ def test_closes_as_a_context(made):
 
 def test_a_camera_is_taken_only_where_one_may_be_missing(made, request):
     other = Camera(64, 48, 1.0, 2.0, 3.0, 4.0)
-    if request.node.callspec.params["made"] == "png-folder":
-        assert open_session(made.path, camera=other).camera == other
+    form = next(form for form in FORMATS if form.name == request.node.callspec.params["made"])
+    if "camera" in form.chosen:
+        fitting = other._replace(width=made.camera.width, height=made.camera.height)
+        assert open_session(made.path, camera=fitting).camera == fitting
+        with pytest.raises(SessionError, match="camera given"):
+            open_session(made.path, camera=other._replace(width=65))
     else:
         with pytest.raises(SessionError, match="its own camera"):
             open_session(made.path, camera=other)

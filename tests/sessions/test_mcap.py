@@ -315,7 +315,7 @@ def test_another_program_s_file_is_told(tmp_path):
         schema = writer.register_schema("pose", "jsonschema", b"{}")
         writer.add_message(writer.register_channel("/pose", "json", schema), 0, b"{}", 0)
         writer.finish()
-    with pytest.raises(SessionError, match=r"did not write \(topics: /pose\)"):
+    with pytest.raises(SessionError, match=r"no ROS messages \(its topics: /pose \(json\)\)"):
         open_session(tmp_path / "robot.mcap")
 
 

@@ -1,0 +1,114 @@
+"""``spf record`` as a user runs it: ended by its time, by Ctrl-C, by the system or by nothing at all."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from benchmarks.kills import kill_once
+from spf.cli import execute
+from spf.sessions import open_session
+from tests.sessions.makers import make_mcap
+
+
+@pytest.fixture
+def made(tmp_path, rng):
+    return make_mcap(tmp_path / "s.mcap", rng, frames=12)
+
+
+def spf(*arguments: object, **options) -> subprocess.Popen:
+    program = "import sys; from spf.cli import main; main()"
+    return subprocess.Popen([sys.executable, "-c", program, *map(str, arguments)], **options)
+
+
+def test_a_replay_is_recorded_to_its_end(made, tmp_path, capsys):
+    out = tmp_path / "r.mcap"
+    assert execute(["record", f"replay:{made.path}", "-o", str(out), "--side", "left"]) == 0
+    assert "Recorded 12 frames (0.4 s" in capsys.readouterr().out
+    session = open_session(out)
+    np.testing.assert_array_equal([session.raw_depth(i) for i in range(12)], made.raw)
+    assert session.side == "left"
+    assert execute(["record", f"replay:{made.path}", "-o", str(out)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert execute(["record", f"replay:{made.path}", "-o", str(out), "--force", "--json"]) == 0
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (last["recorded"], last["not_recorded"], last["complete"]) == (12, 0, True)
+
+
+def test_it_stops_after_its_time(made, tmp_path, capsys):
+    out = tmp_path / "r.mcap"
+    assert execute(["record", f"replay:{made.path}?loop=1", "-o", str(out), "--seconds", "0.7"]) == 0
+    assert 0.4 < open_session(out).times[-1] < 5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["replay:nowhere"], "There is no file or folder nowhere"),
+        (["leap:"], "leap: is no live sensor; there are replay:SESSION"),
+        (["replay:s", "--side", "up"], "--side takes left or right"),
+    ],
+)
+def test_mistakes_are_told(tmp_path, capsys, arguments, said):
+    assert execute(["record", *arguments, "-o", str(tmp_path / "r.mcap")]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "r.mcap").exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ended_from_outside_it_leaves_a_whole_file(made, tmp_path, number):
+    out = tmp_path / "r.mcap"
+    with spf("record", f"replay:{made.path}?loop=1", "-o", out, "--json", stdout=subprocess.PIPE) as child:
+        json.loads(child.stdout.readline())
+        child.send_signal(number)
+        last = json.loads(child.stdout.read().splitlines()[-1])
+    session = open_session(out)
+    assert (child.returncode, session.warnings, last["complete"]) == (0, (), True)
+    assert len(session) == last["recorded"]
+
+
+def test_what_it_counted_is_there_after_kill_9(made, tmp_path):
+    out = tmp_path / "r.mcap"
+    with spf("record", f"replay:{made.path}?loop=1&speed=5", "-o", out, "--json", stdout=subprocess.PIPE) as child:
+        counted = [json.loads(child.stdout.readline())["recorded"] for _ in range(4)][-1]
+        child.kill()
+    session = open_session(out)
+    assert len(session) >= counted > 0
+    for index in range(len(session)):
+        np.testing.assert_array_equal(session.raw_depth(index), made.raw[index % 12])
+
+
+def test_killed_at_random_moments_no_acknowledged_frame_is_lost(made, tmp_path):
+    choose = random.Random(7)
+    for number in range(4):
+        kill = kill_once(str(made.path), tmp_path / f"{number}.mcap", choose.uniform(0, 0.5))
+        assert kill.readable >= kill.acknowledged > 0
+        assert kill.wrong == 0
+        assert f"{kill.readable} complete frames were recovered" in kill.told
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals on this system")
+def test_what_is_typed_becomes_markers_and_notes(made, tmp_path):
+    out = tmp_path / "r.mcap"
+    keyboard, terminal = pty.openpty()
+    options = {"stdin": terminal, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with spf("record", f"replay:{made.path}?loop=1", "-o", out, "--json", **options) as child:
+        child.stdout.readline()
+        os.write(keyboard, b"\nthumb hidden\n")
+        said = [child.stderr.readline(), child.stderr.readline()]
+        time.sleep(0.1)
+        child.send_signal(signal.SIGINT)
+        child.communicate()
+    os.close(keyboard)
+    os.close(terminal)
+    assert said == ["spf: marker set.\n", "spf: noted: thumb hidden\n"]
+    assert [(note.kind, note.text) for note in open_session(out).notes] == [("marker", ""), ("note", "thumb hidden")]
