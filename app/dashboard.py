@@ -16,7 +16,7 @@ from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
 from app.runner import Runner
-from app.server import bundled, kernels, open_shared, renderer
+from app.server import SAMPLES, bundled, kernels, open_shared, renderer
 from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
@@ -25,6 +25,7 @@ from app.views.export_card import ExportCard
 from app.views.fold import folded
 from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
+from app.views.live_card import LiveCard
 from app.views.messages import Messages
 from app.views.modes import Modes
 from app.views.runs_card import RunsCard
@@ -70,10 +71,14 @@ def page() -> pmu.Page:
     runs = folded("Runs", lambda: [RunsCard(state, shelf, reruns).panel])
     export = folded("Export", lambda: [ExportCard(state, controller, renderer(), shelf.folder).panel])
     start = StartCard(state, controller.start)
-    main = [Transport(state, controller).panel, Messages(state).panel, modes.panel]
+    live = LiveCard(state, controller.open, SAMPLES, kernels().wait)
+    transport = Transport(state, controller).panel
+    live.replaces(transport, modes.panel)
+    main = [transport, Messages(state).panel, live.view, modes.panel]
     line = {"margin": (2, 10)}
     sidebar = [
-        session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
+        session.panel, folded("Live sensor", lambda: [live.panel]), pmu.Divider(**line), start.panel,
+        pmu.Divider(**line), lanes.panel, settings.panel,
         landscape.panel, again.panel, pmu.Divider(**line), runs, export,
     ]  # fmt: skip
 
@@ -91,6 +96,7 @@ def page() -> pmu.Page:
     def gone(_context: Any) -> None:
         controller.close()
         previewer.close()
+        live.close()
         uploads.close()
 
     pn.state.onload(first)
