@@ -16,7 +16,7 @@ from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
 from app.runner import Runner
-from app.server import bundled, kernels, open_shared, renderer
+from app.server import SAMPLES, bundled, kernels, open_shared, renderer
 from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
@@ -25,6 +25,7 @@ from app.views.export_card import ExportCard
 from app.views.fold import folded
 from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
+from app.views.live_card import LiveCard
 from app.views.messages import Messages
 from app.views.modes import Modes
 from app.views.names import Names
@@ -82,10 +83,15 @@ def page() -> pmu.Page:
         label="Tour", icon="explore", size="small", variant="text", color="default", margin=(8, 4), sx={"color": "white"},
         on_click=lambda _event: tour.begin(),
     )  # fmt: skip
-    main = [transport.panel, Messages(state).panel, modes.panel, tour, Names(width=0, height=0, margin=0)]
+    live = LiveCard(state, controller.open, SAMPLES, kernels().wait)
+    live.replaces(transport.panel, modes.panel)
+    main = [
+        transport.panel, Messages(state).panel, live.view, modes.panel, tour, Names(width=0, height=0, margin=0),
+    ]  # fmt: skip
     line = {"margin": (2, 10)}
     sidebar = [
-        session.panel, pmu.Divider(**line), start.panel, pmu.Divider(**line), lanes.panel, settings.panel,
+        session.panel, folded("Live sensor", lambda: [live.panel]), pmu.Divider(**line), start.panel,
+        pmu.Divider(**line), lanes.panel, settings.panel,
         landscape.panel, again.panel, pmu.Divider(**line), runs, export,
     ]  # fmt: skip
 
@@ -103,6 +109,7 @@ def page() -> pmu.Page:
     def gone(_context: Any) -> None:
         controller.close()
         previewer.close()
+        live.close()
         uploads.close()
 
     pn.state.onload(first)
