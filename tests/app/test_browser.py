@@ -4,7 +4,6 @@ import io
 import os
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -45,7 +44,7 @@ def server(tmp_path_factory):
             _wait_for(f"http://localhost:{port}/app", process)
             yield f"http://localhost:{port}/app", log
         finally:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
             process.wait(60)
 
 
