@@ -36,7 +36,7 @@ def look_from(page, name):
 
 
 def choose(page, label, option):
-    page.get_by_label(label).filter(visible=True).click()
+    page.get_by_label(label, exact=True).filter(visible=True).click()
     page.locator("li").get_by_text(option, exact=True).click()
 
 

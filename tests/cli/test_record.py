@@ -54,7 +54,7 @@ def test_it_stops_after_its_time(made, tmp_path, capsys):
     ("arguments", "said"),
     [
         (["replay:nowhere"], "There is no file or folder nowhere"),
-        (["leap:"], "leap: is no live sensor; there are replay:SESSION"),
+        (["leap:"], "leap: is no live sensor; there are realsense:"),
         (["replay:s", "--side", "up"], "--side takes left or right"),
     ],
 )
