@@ -50,7 +50,10 @@ class HandShape(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the shape as a JSON-able mapping, the content of a shape file."""
-        return {"format": _FORMAT, "version": 1, **self._asdict(), "lengths": list(self.lengths)}
+        content = {"format": _FORMAT, "version": 1, **self._asdict(), "lengths": list(self.lengths)}
+        if self.lens == 1.0:
+            del content["lens"]  # of most hands, which were found through the stated camera
+        return content
 
     @classmethod
     def from_dict(cls, content: dict[str, Any], source: str = "The hand shape") -> HandShape:
