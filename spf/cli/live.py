@@ -18,7 +18,7 @@ import typer
 from rich.console import Console
 from rich.status import Status
 
-from spf.cli.console import check_output, complain, warn
+from spf.cli.console import check_output, complain, warn, warn_of
 from spf.cli.sessions import Force
 from spf.errors import RunError, SettingError
 from spf.evaluate import count_losses
@@ -106,14 +106,7 @@ def stream(
             complain(
                 f"{sensor} is sent from {publisher.address}; there: spf track zmq://{socket.gethostname()}:{port} -o RUN"
             )
-            until = float("inf") if seconds is None else time.monotonic() + seconds
-            told = ""
-            while time.monotonic() < until and not feed.state.ended:
-                show(facts(feed.state, None))
-                if feed.state.message != told:
-                    told = feed.state.message
-                    warn(told)
-                time.sleep(min(_STATUS_EVERY, max(until - time.monotonic(), 0.0)))
+            _watch(feed, float("inf") if seconds is None else time.monotonic() + seconds, show)
     finally:
         publisher.close()
     if not as_json:
@@ -153,7 +146,7 @@ def track_live(
         with suppress(KeyboardInterrupt):
             start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
             if start is not None:
-                warn(start.doubt)
+                warn_of(start)
                 command = ["spf", *sys.argv[1:]]
                 kept = LiveRun(directory, output, uri, request, start, command, overwrite=force)
                 stack.enter_context(kept)
@@ -215,17 +208,17 @@ def _summary(kept: LiveRun, directory: Path) -> str:
 
 
 def _watch(feed: Feed, until: float, show: Any) -> None:
-    """Show how the recording goes until its time is over or it ends by itself."""
+    """Show how a feed, and its recording if there is one, goes until its time is over or it ends by itself."""
     told = ""
     while time.monotonic() < until:
         state, recording = feed.state, feed.recording
-        assert recording is not None
         show(facts(state, recording))
-        sentence = recording.ended or recording.warning or state.message
+        ended = "" if recording is None else recording.ended
+        sentence = ended or ("" if recording is None else recording.warning) or state.message
         if sentence != told:
             told = sentence
             warn(sentence)
-        if state.ended or recording.ended:
+        if state.ended or ended:
             return
         feed.newest(state.taken - 1, min(_STATUS_EVERY, max(until - time.monotonic(), 0.0)))
         time.sleep(min(_STATUS_EVERY, max(until - time.monotonic(), 0.0)))

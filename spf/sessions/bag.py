@@ -113,6 +113,20 @@ class ChunkedBag(Bag):
         self._kept: OrderedDict[int, bytes] = OrderedDict()
         self._lock = threading.Lock()
 
+    def _add(self, topic: str, kind: str, places: list[Place]) -> None:
+        """Take in where messages of a topic lie; a topic may come in several parts."""
+        self.places.setdefault(topic, []).extend(places)
+        self.topics[topic] = Topic(topic, kind, 0)
+
+    def _finish(self, *, whole: bool) -> None:
+        """Order and count what was taken in, and warn of a file that is not whole."""
+        for topic, places in self.places.items():
+            places.sort()
+            self.topics[topic] = self.topics[topic]._replace(messages=len(places))
+        if not whole:
+            count = sum(map(len, self.places.values()))
+            self.warnings = (f"{self.path.name} was torn or is damaged: {count} messages were recovered.",)
+
     @abstractmethod
     def _unpack(self, file: BinaryIO, offset: int) -> bytes:
         """Read and unpack the chunk at an offset of the file."""

@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, MessageIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from spf.sessions.bag import DAMAGE, ChunkedBag, Place, Topic, decompress, unpack_message
+from spf.sessions.bag import DAMAGE, ChunkedBag, Place, decompress, unpack_message
 
 __all__ = ["McapBag"]
 
@@ -52,14 +52,8 @@ class McapBag(ChunkedBag):
                 continue
             self.cdr = channel.message_encoding == "cdr"
             kind = _ros2_name(self._schemas.get(channel.schema_id, ""))
-            self.places.setdefault(channel.topic, []).extend(places)
-            self.topics[channel.topic] = Topic(channel.topic, kind, 0)
-        for name, places in self.places.items():
-            places.sort()
-            self.topics[name] = self.topics[name]._replace(messages=len(places))
-        if not whole:
-            count = sum(map(len, self.places.values()))
-            self.warnings = (f"{path.name} was torn or is damaged: {count} messages were recovered.",)
+            self._add(channel.topic, kind, places)
+        self._finish(whole=whole)
 
     def _walk(self, file: BinaryIO, found: dict[int, list[Place]]) -> bool:
         """Fill in where the messages lie; tells whether the file was finished and is whole."""

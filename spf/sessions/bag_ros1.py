@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from spf.sessions.bag import DAMAGE, ChunkedBag, Place, Topic, decompress
+from spf.sessions.bag import DAMAGE, ChunkedBag, Place, decompress
 
 __all__ = ["MAGIC", "Ros1Bag"]
 
@@ -92,14 +92,8 @@ class Ros1Bag(ChunkedBag):
             whole = self._walk(file, found)
         for number, places in found.items():
             name, kind = self._names[number]
-            self.places.setdefault(name, []).extend(places)
-            self.topics[name] = Topic(name, kind, 0)
-        for name, places in self.places.items():
-            places.sort()
-            self.topics[name] = self.topics[name]._replace(messages=len(places))
-        if not whole:
-            count = sum(map(len, self.places.values()))
-            self.warnings = (f"{path.name} was torn or is damaged: {count} messages were recovered.",)
+            self._add(name, kind, places)
+        self._finish(whole=whole)
 
     def _walk(self, file: BinaryIO, found: dict[int, list[Place]]) -> bool:
         """Fill in where the messages lie; tells whether the bag was closed by its recorder and is whole."""

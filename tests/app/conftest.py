@@ -10,6 +10,16 @@ from app.server import bundled
 from app.state import State
 
 
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory):
+    """The folder of a server's runs; they and its presets go where nobody's are."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("runs")
+        patch.setenv("SPF_RUNS", str(folder))
+        patch.setenv("SPF_PRESETS", str(tmp_path_factory.mktemp("presets")))
+        yield folder
+
+
 @pytest.fixture
 def sample():
     """The path of a bundled session."""

@@ -31,7 +31,7 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this ma
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory):
+def server(tmp_path_factory, shelf):
     """The address of a server, and its log so far."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

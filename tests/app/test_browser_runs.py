@@ -20,16 +20,6 @@ from tests.app.test_browser import (  # noqa: F401 - fixtures
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def shelf(tmp_path_factory):
-    """The folder of this test's runs, so that they go where nobody's are."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("runs")
-        patch.setenv("SPF_RUNS", str(folder))
-        patch.setenv("SPF_PRESETS", str(tmp_path_factory.mktemp("presets")))
-        yield folder
-
-
 def kept(shelf):
     return sorted(path.name for path in shelf.iterdir())
 

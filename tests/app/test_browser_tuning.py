@@ -22,15 +22,6 @@ from tests.app.test_browser import (  # noqa: F401 - fixtures
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def own_folders(tmp_path_factory):
-    """Runs and presets of this test go where nobody's are."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("SPF_RUNS", str(tmp_path_factory.mktemp("runs")))
-        patch.setenv("SPF_PRESETS", str(tmp_path_factory.mktemp("presets")))
-        yield
-
-
 def picture_of(page, name):  # noqa: F811
     page.screenshot(path=ARTEFACTS / f"tuning-{name}.png")
 
