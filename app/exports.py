@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from app.runner import Report
-from app.shelf import plan_of_lane
+from app.shelf import plan_of_lane, run_of
 from app.state import State
 from spf.errors import StartError
 from spf.export import View, write_film, write_picture, write_table
-from spf.manifest import manifest_of
 from spf.render import Renderer
 from spf.report import write_report
 from spf.runs import Run
 from spf.sessions import Session
-from spf.trackfile import track_of
 
 __all__ = ["EXPORTS", "Export", "Wanted", "exported", "wanted_of"]
 
@@ -71,14 +70,8 @@ def wanted_of(state: State, folder: Path) -> Wanted:
     lane, session, origin = state.lane, state.session, state.origin
     if session is None or origin is None or not lane.results.summaries:
         raise StartError("Nothing is tracked yet: press Start, then Step or Play, and export what was tracked.")
-    plan, rows = plan_of_lane(lane, origin, state.init), lane.results.rows
-    camera = Path(state.camera) if state.camera else None
-
-    def run() -> Run:
-        manifest = manifest_of(plan, session, camera, ["panel", "serve", "app"])
-        manifest |= {"name": lane.label or lane.title, "complete": True, "frames_tracked": len(rows)}
-        return Run(manifest, plan, track_of(rows, plan.start.shape.hand().dof_names))
-
+    plan, label, rows = plan_of_lane(lane, origin, state.init), lane.label or lane.title, lane.results.rows
+    run = partial(run_of, plan, session, state.camera, label, rows)
     directory = str(folder / lane.folder.run) if lane.folder.run else "RUN"
     return Wanted(session, run, directory, state.frame, View(state.azimuth, state.elevation, state.zoom))
 

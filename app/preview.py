@@ -17,6 +17,7 @@ from spf.errors import SpfError
 from spf.filters.reweigh import SEEN_AT_ONCE, landscape, reweigh
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of
+from spf.lens import seen_through
 from spf.locate import reach_of
 from spf.observation import Observation, observe
 from spf.settings import Settings
@@ -125,7 +126,8 @@ def _seen_again(base: Entry, frame: Frame) -> Observation:
     """What was looked at; where a lost hand was found again, the place is that of the estimate."""
     before = base.before
     centre = base.result.pose[:3] if before.lost else before.filter.estimate[:3]
-    return observe(frame, centre, reach_of(base.tracking.hand))
+    how = base.tracking
+    return observe(seen_through(frame, how.start.shape.lens), centre, reach_of(how.hand))
 
 
 def _preview(job: _Job, observation: Observation) -> Preview:

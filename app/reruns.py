@@ -10,7 +10,7 @@ from app.lane import Lane, Origin
 from app.results import Entry, entry_of
 from app.runner import Report
 from app.shelf import Shelf, reopen
-from app.state import State
+from app.state import State, warning_of
 from spf.errors import StartError
 from spf.manifest import read_manifest
 from spf.runs import MANIFEST
@@ -124,7 +124,7 @@ class Reruns:
             label = str(read.manifest.get("name") or "")
             lane.take(run, read.plan, results, origin, label)
             first = origin if state.origin is None or not beside else state.origin
-            state.param.update(origin=first, lane=lane, warning=read.plan.start.doubt or "", rules=state.rules + 1)
+            state.param.update(origin=first, lane=lane, warning=warning_of(read.plan.start), rules=state.rules + 1)
             if beside:
                 state.mode = "compare"
             state.show(min(frame if frame is not None else origin.start.frame, len(held) - 1))

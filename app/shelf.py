@@ -7,6 +7,7 @@ import io
 import os
 import re
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,13 +17,13 @@ from app.runner import Report
 from spf.errors import RunError
 from spf.initialise import Start
 from spf.manifest import Change, Plan, manifest_of, read_manifest, write_manifest
-from spf.runs import MANIFEST, TRACK, Run, check_same_session, read_run, save_run
+from spf.runs import MANIFEST, TRACK, Run, check_same_session, read_run, save_run, tracking_at
 from spf.sessions import Session
 from spf.statefile import read_states, write_states
-from spf.track import Tracking, begin
-from spf.trackfile import rows_of, track_of
+from spf.track import begin
+from spf.trackfile import TrackRow, rows_of, track_of
 
-__all__ = ["Kept", "Shelf", "plan_of_lane", "reopen"]
+__all__ = ["Kept", "Shelf", "plan_of_lane", "reopen", "run_of"]
 
 STATES = "states.npz"
 _FILES = (MANIFEST, TRACK, STATES)
@@ -103,11 +104,9 @@ class Shelf:
         Raises:
             RunError: it cannot be written.
         """
-        folder, camera_file = self.folder / run, Path(camera) if camera else None
-        rows, states = results.rows, results.states
-        manifest = manifest_of(plan, session, camera_file, ["panel", "serve", "app"]) | {"name": label}
-        write_states(states, folder / STATES)
-        save_run(folder, manifest, track_of(rows, plan.start.shape.hand().dof_names), complete=True)
+        folder, made = self.folder / run, run_of(plan, session, camera, label, results.rows)
+        write_states(results.states, folder / STATES)
+        save_run(folder, made.manifest, made.track, complete=True)
 
     def rename(self, run: str, label: str) -> None:
         """Give a run another name for people."""
@@ -144,6 +143,17 @@ def _label(manifest: dict[str, Any]) -> str:
     return str(manifest.get("name") or f"{manifest['tracker']} · {manifest['preset']}")
 
 
+def run_of(plan: Plan, session: Session, camera: str, label: str, rows: Sequence[TrackRow]) -> Run:
+    """Return what a page has tracked as a run, like one that was read from its folder.
+
+    Raises:
+        SessionError: a frame cannot be read (for the session's fingerprint).
+    """
+    manifest = manifest_of(plan, session, Path(camera) if camera else None, ["panel", "serve", "app"])
+    manifest |= {"name": label, "complete": True, "frames_tracked": len(rows)}
+    return Run(manifest, plan, track_of(rows, plan.start.shape.hand().dof_names))
+
+
 def plan_of_lane(lane: Lane, origin: Origin, init: str) -> Plan:
     """Return what repeats what a lane has tracked, changes on the way included."""
     summaries = lane.results.summaries
@@ -176,11 +186,6 @@ def reopen(shelf: Shelf, name: str, session: Session, report: Report) -> tuple[R
     origin = Origin(plan.start, float(session.times[plan.start.frame]), plan.seed)
     tracking, _ = begin(plan.tracker, plan.settings, plan.start, plan.seed, time=origin.time)
 
-    def how(index: int) -> Tracking:
-        passed = [change for change in plan.changes if change.frame <= index]
-        if not passed:
-            return tracking
-        last = passed[-1]
-        return tracking._replace(tracker=last.tracker, settings=last.settings, seed=last.seed)
-
-    return run, Results.reopened(rows, read_states(folder / STATES), how, session, report), origin
+    states = read_states(folder / STATES)
+    results = Results.reopened(rows, states, lambda index: tracking_at(plan, tracking, index), session, report)
+    return run, results, origin

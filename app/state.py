@@ -10,12 +10,12 @@ from app.lane import Lane, Origin
 from app.look import Look
 from app.results import Entry, Summary
 from spf.errors import SettingError
-from spf.initialise import Doubted
+from spf.initialise import Doubted, Start
 from spf.learned.network import available_network
 from spf.sessions import Session
 from spf.trackers import TRACKERS
 
-__all__ = ["COLOURS", "INITS", "MODES", "SHAPES", "State"]
+__all__ = ["COLOURS", "INITS", "MODES", "SHAPES", "State", "warning_of"]
 
 #: Ways to the first pose and to the hand's shape, by the words of the page.
 INITS = {"Find it automatically": "auto", "Take it from the truth": "truth", "Read a pose file": "file"}
@@ -32,6 +32,12 @@ _REMEDIES: dict[Doubted, str] = {
     "pose": "Look whether the hand covers the points; if not, start with another seed or from a pose file.",
     "side": "If you know the hand, read it from a hand file and start again.",
 }
+
+
+def warning_of(start: Start) -> str:
+    """Return what may be wrong with a start and what to do about it, or "" where all is believed."""
+    doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
+    return " ".join(text for text in (doubt, start.remark) if text)
 
 
 class State(param.Parameterized):
@@ -155,11 +161,9 @@ class State(param.Parameterized):
         """Begin anew; what was tracked from another start is dropped."""
         for lane in self.lanes:
             lane.clear()
-        start = origin.start
-        doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
-        warning = " ".join(text for text in (doubt, start.remark, available_network()[1]) if text)
+        warning = " ".join(text for text in (warning_of(origin.start), available_network()[1]) if text)
         self.param.update(
-            origin=origin, frame=start.frame, error="", warning=warning, revision=self.revision + 1
+            origin=origin, frame=origin.start.frame, error="", warning=warning, revision=self.revision + 1
         )  # fmt: skip
 
     def rewind(self) -> None:

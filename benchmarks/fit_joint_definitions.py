@@ -26,7 +26,7 @@ from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
 from spf.joint_definitions import corrected_joints, definitions, relative_offsets
-from spf.lens import as_stated
+from spf.lens import as_seen, as_stated
 from spf.manifest import Plan
 from spf.prepare import prepare
 from spf.runs import MANIFEST, read_run, reopen_session, track_plan
@@ -105,7 +105,7 @@ def _offsets(item: _Tracked) -> Array:
         truth = item.session.truth(int(item.track.frame[row]))
         if truth is not None:
             posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
-            result[place] = relative_offsets(item.hand, posed, truth.joints / as_stated(np.ones(3), item.lens))
+            result[place] = relative_offsets(item.hand, posed, as_seen(truth.joints, item.lens))
     return result
 
 

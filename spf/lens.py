@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from spf.frame import Frame
 
-__all__ = ["Through", "as_stated", "is_believable", "lens_of", "lenses_for", "seen_through"]
+__all__ = ["Through", "as_seen", "as_stated", "is_believable", "lens_of", "lenses_for", "seen_through"]
 
 Array = NDArray[np.float64]
 _LENGTH, _SPREAD = 0.187, 0.012  # m, from the wrist to the tip of the middle finger: adults' hands
@@ -32,13 +32,18 @@ def seen_through(frame: Frame, lens: float) -> Frame:
     camera = frame.camera._replace(fx=frame.camera.fx * lens, fy=frame.camera.fy * lens)
     truth = frame.truth
     if truth is not None:
-        truth = truth._replace(joints=truth.joints / _stretch(lens), pose=None, orientation=None)
+        truth = truth._replace(joints=as_seen(truth.joints, lens), pose=None, orientation=None)
     return frame._replace(camera=camera, truth=truth)
 
 
 def as_stated(points: Array, lens: float) -> Array:
     """Return where the stated camera puts points (…, 3) that were found through a lens: in the same pixels and depths."""
     return points * _stretch(lens)
+
+
+def as_seen(points: Array, lens: float) -> Array:
+    """Return where a lens shows points (…, 3) that are given in the stated camera; undoes :func:`as_stated`."""
+    return points / _stretch(lens)
 
 
 def _stretch(lens: float) -> Array:

@@ -8,10 +8,9 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from spf.errors import RunError
-from spf.hand.kinematics import joints_of
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.sessions import Session, open_session
-from spf.track import TrackedFrame, Tracking, TrackState, begin, run, track_frame
+from spf.track import TrackedFrame, Tracking, TrackState, begin, run, stated_joints, track_frame
 from spf.trackfile import Track, TrackRow, read_track, row_of, track_of, write_track
 
 __all__ = [
@@ -26,6 +25,7 @@ __all__ = [
     "reopen_session",
     "save_run",
     "track_plan",
+    "tracking_at",
 ]
 
 MANIFEST, TRACK = "manifest.json", "track.parquet"
@@ -77,20 +77,24 @@ def track_plan(session: Session, plan: Plan, frames: Sequence[int] | None = None
         return
     began = float(session.times[plan.start.frame])
     tracking, state = begin(plan.tracker, plan.settings, plan.start, plan.seed, time=began)
-    joints = joints_of(tracking.hand, plan.start.pose, plan.start.reference)
+    joints = stated_joints(tracking, plan.start.pose, plan.start.reference)
     nan = float("nan")
     for index in range(plan.first, plan.start.frame):
         yield TrackedFrame(
             index, float(session.times[index]), plan.start.pose, plan.start.reference, joints, True, False,
             nan, nan, nan, nan, 0.0, {}, None, None,
         )  # fmt: skip
-    changes = {change.frame: change for change in plan.changes}
     for index in range(plan.start.frame, plan.last):
-        if index in changes:
-            change = changes[index]
-            tracking = tracking._replace(tracker=change.tracker, settings=change.settings, seed=change.seed)
-        state, result = track_frame(tracking, state, session[index])
+        state, result = track_frame(tracking_at(plan, tracking, index), state, session[index])
         yield result
+
+
+def tracking_at(plan: Plan, tracking: Tracking, frame: int) -> Tracking:
+    """Return what a frame of a run is tracked with: what the run began with, and the last change up to there."""
+    change = next((change for change in reversed(plan.changes) if change.frame <= frame), None)
+    if change is None:
+        return tracking
+    return tracking._replace(tracker=change.tracker, settings=change.settings, seed=change.seed)
 
 
 class RunWriter:

@@ -30,7 +30,7 @@ from spf.recover import recover
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
-__all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "run", "track_frame"]
+__all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "run", "stated_joints", "track_frame"]
 
 Array = NDArray[np.float64]
 _HISTORY = 30  # golden energies that a loss is judged against
@@ -151,8 +151,7 @@ def track_frame(
         (state, result).
     """
     began = time.perf_counter()
-    lens = tracking.start.shape.lens
-    frame = seen_through(frame, lens)
+    frame = seen_through(frame, tracking.start.shape.lens)
     rng = np.random.default_rng([tracking.seed, frame.index])
     was_lost = state.lost
     if was_lost:
@@ -168,7 +167,7 @@ def track_frame(
         spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
     )  # fmt: skip
     new = _judged(tracking, state, filter_state, info)
-    joints = as_stated(joints_of(tracking.hand, info.estimate, info.reference), lens)
+    joints = stated_joints(tracking, info.estimate, info.reference)
     timings = {
         "search": searched - began,
         "observe": observed - searched,
@@ -181,6 +180,11 @@ def track_frame(
         info, observation,
     )  # fmt: skip
     return new, result
+
+
+def stated_joints(tracking: Tracking, pose: Array, reference: Array) -> Array:
+    """Return the joints (21, 3), m, of a pose (D,) relative to ``reference``, as the stated camera shows them."""
+    return as_stated(joints_of(tracking.hand, pose, reference), tracking.start.shape.lens)
 
 
 def _look(tracking: Tracking, state: TrackState, frame: Frame) -> Observation:
@@ -239,8 +243,7 @@ def _judged(tracking: Tracking, state: TrackState, filter_state: State, info: St
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:
     nan = float("nan")
-    joints = joints_of(tracking.hand, state.filter.estimate, state.filter.reference)
-    joints = as_stated(joints, tracking.start.shape.lens)
+    joints = stated_joints(tracking, state.filter.estimate, state.filter.reference)
     seconds = time.perf_counter() - began
     return TrackedFrame(
         frame.index, frame.time, state.filter.estimate, state.filter.reference, joints, True, False,

@@ -8,10 +8,13 @@ import pytest
 from spf.frame import Camera, Frame, Truth
 from spf.hand.kinematics import joints_of
 from spf.hand.shape import HandShape
-from spf.initialise import find_start
-from spf.lens import Through, as_stated, is_believable, lens_of, lenses_for, seen_through
+from spf.initialise import Start, find_start
+from spf.lens import Through, as_seen, as_stated, is_believable, lens_of, lenses_for, seen_through
+from spf.manifest import Plan
 from spf.prepare import SessionFrames
+from spf.runs import track_plan
 from spf.sessions import open_session
+from spf.trackers import make_settings
 
 CAMERA = Camera(320, 240, 220.0, 225.0, 160.0, 120.0)
 
@@ -27,6 +30,7 @@ def test_the_pixels_and_depths_of_the_truth_stay():
     assert seen.truth is not None
     np.testing.assert_allclose(seen.camera.project(seen.truth.joints), CAMERA.project(joints))
     np.testing.assert_allclose(as_stated(seen.truth.joints, 1.4), joints)
+    np.testing.assert_allclose(as_seen(joints, 1.4), seen.truth.joints)
 
 
 def test_frames_are_seen_through_a_lens_one_by_one_and_in_parts():
@@ -70,3 +74,13 @@ def test_a_start_mends_a_focal_length_that_is_a_third_too_short():
     assert truth is not None
     joints = as_stated(joints_of(start.shape.hand(), start.pose, start.reference), start.shape.lens)
     assert np.linalg.norm(joints - truth.joints, axis=1).mean() < 0.025  # m, in the stated camera
+
+
+def test_frames_before_the_first_pose_show_it_in_the_stated_camera_too():
+    session, shape = open_session("sessions/open-close.mcap"), HandShape("right", lens=1.2)
+    pose = shape.hand().neutral_pose()
+    pose[:3] = 0.05, 0.02, 0.5
+    start = Start(1, pose, np.eye(3), shape, 0.2, 1.0)
+    result = next(track_plan(session, Plan("spf", "default", make_settings("spf"), 0, "auto", 0, 2, start)))
+    assert (result.index, result.lost) == (0, True)
+    np.testing.assert_allclose(result.joints, as_stated(joints_of(shape.hand(), pose), 1.2))

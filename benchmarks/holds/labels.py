@@ -9,7 +9,7 @@ from spf.evaluate.floor import marked
 from spf.frame import JOINT_NAMES
 from spf.hand.model import Hand
 from spf.joint_definitions import offsets_of
-from spf.lens import as_stated
+from spf.lens import as_seen
 from spf.prepare import side_of
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession
@@ -37,7 +37,7 @@ def hand_of_labels(session: Session, lens: float = 1.0) -> Hand:
     """
     if isinstance(session, SyntheticSession):
         return session.hand
-    joints = _some_joints(session, _SIZE_FRAMES) / as_stated(np.ones(3), lens)
+    joints = as_seen(_some_joints(session, _SIZE_FRAMES), lens)
     return labelled_hand("left" if true_side(session) == "left" else "right", joints, _offsets(session))
 
 

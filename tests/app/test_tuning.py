@@ -9,7 +9,7 @@ from app.address import Address, Place, place_of
 from app.controller import Controller
 from app.lane import Lane
 from app.presets import Presets
-from app.preview import Previewer
+from app.preview import Previewer, _seen_again
 from app.reruns import Reruns
 from app.runner import Runner
 from app.server import bundled
@@ -57,6 +57,16 @@ def test_a_moved_slider_is_seen_in_the_frame_shown_and_tracks_nothing(page, samp
     assert card.image.data["cost"][0].shape == (19, 19)
     assert len(card.samples.data["x"]) == len(now.predicted) + len(now.optimised) + 1
     previewer.close()
+
+
+def test_the_frame_is_seen_again_through_the_lens_that_it_was_tracked_through(page, sample, act):
+    state, controller = page
+    act(lambda: controller.open(sample), controller.start)
+    base, frame = state.lane.entry(0), state.session[0]
+    start = base.tracking.start
+    through = base.tracking._replace(start=start._replace(shape=start.shape._replace(lens=1.3)))
+    for tracking, lens in ((base.tracking, 1.0), (through, 1.3)):
+        assert _seen_again(base._replace(tracking=tracking), frame).camera.fx == pytest.approx(lens * frame.camera.fx)
 
 
 def test_what_cannot_be_seen_at_once_is_said(page, sample):
