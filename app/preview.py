@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
+import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,7 @@ __all__ = ["Landscape", "Preview", "Previewer"]
 _CELLS = 19  # of the landscape along each side
 _LEAST_REACH = {True: 0.01, False: 0.12}  # m and rad that the landscape shows at least beside the estimate
 _ROOM = 1.25  # beyond the samples
+_PICTURES_FIRST = 0.4  # s that the pictures of a new frame have the machine for themselves
 
 
 class Landscape(NamedTuple):
@@ -50,7 +52,7 @@ class Preview(NamedTuple):
         base: what was tracked.
         settings: that it is weighed with.
         entry: what the settings make of it.
-        landscape: of the cost around the estimate; None when nobody looks.
+        landscape: of the cost around the estimate; None until it is known, and with another tracker.
         note: what changed, in words.
     """
 
@@ -68,6 +70,7 @@ class Previewer:
         self._state = state
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="spf-preview")
         self._busy = False
+        self._shown = -_PICTURES_FIRST  # when a frame was shown, s
         self._observed: tuple[Entry, Observation] | None = None
         state.param.watch(self.request, ["rules", "revision", "playing", "landscape_of"])
 
@@ -75,9 +78,11 @@ class Previewer:
         """The page is gone."""
         self._thread.shutdown(wait=False, cancel_futures=True)
 
-    def request(self, *_events: object) -> None:
+    def request(self, *events: Any) -> None:
         """Have the frame shown weighed with the present settings, unless it is."""
         state = self._state
+        if any(event.name == "revision" for event in events):
+            self._shown = time.monotonic()
         base = state.lane.entry(state.frame)
         if state.playing or self._busy or base is None or base.result.info is None or self._is_current(base):
             return
@@ -92,14 +97,22 @@ class Previewer:
 
     async def _work(self, base: Entry) -> None:
         state = self._state
+        await asyncio.sleep(self._shown + _PICTURES_FIRST - time.monotonic())
+        if state.lane.entry(state.frame) is not base:
+            self._busy = False
+            self.request()
+            return
         assert state.session is not None
         settings, index = state.lane.settings, base.result.index
         try:
             job = _Job(base, settings, state.lane.tracker, state.landscape_of)
-            state.preview = await asyncio.get_running_loop().run_in_executor(
-                self._thread, self._weighed, job, state.session[index]
-            )
+            loop, frame = asyncio.get_running_loop(), state.session[index]
+            preview, observation = await loop.run_in_executor(self._thread, self._weighed, job, frame)
+            state.preview = preview
             state.previewed += 1
+            if job.tracker == base.tracking.tracker:  # the landscape takes longer, and comes after the samples
+                land = await loop.run_in_executor(self._thread, _around, job, preview.entry, observation)
+                state.preview = preview._replace(landscape=land)
         except SpfError as error:
             state.error = str(error)
         finally:
@@ -109,10 +122,10 @@ class Previewer:
         ):  # fmt: skip
             self.request()
 
-    def _weighed(self, job: _Job, frame: Frame) -> Preview:
+    def _weighed(self, job: _Job, frame: Frame) -> tuple[Preview, Observation]:
         if self._observed is None or self._observed[0] is not job.base:
             self._observed = job.base, _seen_again(job.base, frame)
-        return _preview(job, self._observed[1])
+        return _preview(job, self._observed[1]), self._observed[1]
 
 
 class _Job(NamedTuple):
@@ -137,8 +150,7 @@ def _preview(job: _Job, observation: Observation) -> Preview:
     assert isinstance(settings, CostSettings)
     assert isinstance(how.settings, CostSettings)
     note, entry = "", base
-    other = job.tracker != how.tracker
-    if other:
+    if job.tracker != how.tracker:
         note = "This frame was tracked with another tracker: track it again to see what this one does."
     elif settings != how.settings:
         was, now = how.settings.to_dict(), settings.to_dict()
@@ -156,7 +168,7 @@ def _preview(job: _Job, observation: Observation) -> Preview:
             note = _told(base, entry)
             if later:
                 note += f" {', '.join(later)}: seen when the frame is tracked again."
-    return Preview(base, settings, entry, None if other else _around(job, entry, observation), note)
+    return Preview(base, settings, entry, None, note)
 
 
 def _told(base: Entry, entry: Entry) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import asyncio
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import cv2
@@ -26,33 +27,54 @@ _TRUTH = tuple(round(255 * part) for part in PREDICTED)
 
 
 class Depth:
-    """The pane, with the skeleton of every lane shown."""
+    """The pane, with the skeleton of every lane shown; drawn beside the event loop, the newest wins."""
 
     def __init__(self, state: State, mode: str = "one") -> None:
         self._state, self._mode = state, mode
+        self._wanted = False
+        self._drawing: asyncio.Task[None] | None = None
         self.pane = Picture(
             hint="Choose a session to see its depth images.", alt="Depth image", sizing_mode="stretch_both", margin=0
         )
         state.param.watch(self.draw, ["session", "revision", "with_truth"])
+        state.look.param.watch(self.draw, "tab")
 
     def draw(self, *_events: Any) -> None:
-        """Draw the frame shown."""
+        """Have the frame shown drawn, if it is seen."""
         state = self._state
-        if state.session is None or state.mode != self._mode:
+        if state.session is None or state.mode != self._mode or (self._mode == "one" and state.look.tab != "overview"):
             return
-        try:
-            frame = state.session[state.frame]
-        except SessionError as error:
-            state.error = str(error)
-            return
+        self._wanted = True
+        if self._drawing is None or self._drawing.done():
+            self._drawing = asyncio.get_running_loop().create_task(self._draw())
+
+    async def _draw(self) -> None:
+        while self._wanted:
+            self._wanted = False
+            try:
+                self.pane.image = await asyncio.to_thread(self._work())
+            except SessionError as error:
+                self._state.error = str(error)
+
+    def _work(self) -> Callable[[], bytes]:
+        """What there is to draw, fixed as it is now."""
+        state = self._state
+        session, index, with_truth = state.session, state.frame, state.with_truth
+        assert session is not None
         seen = state.entry.seen if state.entry is not None else None
-        skeletons = [Skeleton(frame.truth.joints, _TRUTH)] if state.with_truth and frame.truth is not None else []
-        for lane in state.active:
-            summary = lane.summary(state.frame)
-            if summary is not None and not summary.lost:
-                colour = _rgb(lane.colour) if self._mode == "compare" else _ESTIMATE
-                skeletons.append(Skeleton(summary.joints, colour))
-        self.pane.image = depth_jpeg(frame, seen, skeletons)
+        shown = [(lane.colour, lane.summary(index)) for lane in state.active]
+        estimates = [
+            Skeleton(summary.joints, _rgb(colour) if self._mode == "compare" else _ESTIMATE)
+            for colour, summary in shown
+            if summary is not None and not summary.lost
+        ]
+
+        def work() -> bytes:
+            frame = session[index]
+            truth = [Skeleton(frame.truth.joints, _TRUTH)] if with_truth and frame.truth is not None else []
+            return depth_jpeg(frame, seen, [*truth, *estimates])
+
+        return work
 
 
 def depth_jpeg(frame: Frame, seen: Seen | None = None, skeletons: Sequence[Skeleton] = ()) -> bytes:

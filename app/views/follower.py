@@ -13,7 +13,7 @@ from app.state import State
 __all__ = ["Follower"]
 
 _EVERY = 0.6  # s between two redraws while playing
-_PICTURES_FIRST = 80  # ms that the plots leave to the pictures, which are looked at first
+_PICTURES_FIRST = 400  # ms that the plots wait at most for the pictures of a frame, which are looked at first
 
 
 class Follower(ABC):
@@ -33,10 +33,12 @@ class Follower(ABC):
         self, state: State, mode: str | None = "one", also: tuple[str, ...] = (), look: tuple[str, ...] = ()
     ) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
+        self._waiting: Any = None  # the document's callback that draws at the latest
         state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
+        state.param.watch(self._pictured, "pictured")
         state.look.param.watch(self._follow, ["tab", *look])
 
-    def _follow(self, *_events: Any) -> None:
+    def _follow(self, *events: Any) -> None:
         hidden = self._mode == "one" and self.state.look.tab != self.tab
         if self._mode is not None and (self.state.mode != self._mode or hidden):
             return
@@ -47,8 +49,22 @@ class Follower(ABC):
         document = pn.state.curdoc
         if document is None or document.session_context is None:
             self.draw()
+        elif any(event.name == "revision" for event in events):
+            if self._waiting is None:
+                self._waiting = document.add_timeout_callback(self._draw, _PICTURES_FIRST)
         else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
-            document.add_timeout_callback(self.draw, _PICTURES_FIRST)
+            document.add_next_tick_callback(self.draw)
+
+    def _pictured(self, *_events: Any) -> None:
+        document = pn.state.curdoc
+        if self._waiting is not None and document is not None:
+            document.remove_timeout_callback(self._waiting)
+            self._waiting = None
+            document.add_next_tick_callback(self.draw)
+
+    def _draw(self) -> None:
+        self._waiting = None
+        self.draw()
 
     @abstractmethod
     def draw(self) -> None:

@@ -34,7 +34,7 @@ class LandscapeCard(Follower):
             "x", "y", source=self.samples, color="colour", marker="marker", size="size", line_color="#20262c"
         )  # fmt: skip
         keys = ("■", BEFORE, "pred."), ("●", AFTER, "opt."), ("✚", "#ffffff", "estimate")
-        super().__init__(state, None, also=("lane", "rules"))
+        super().__init__(state, None, also=("lane", "rules", "preview"))
         self.figure = plot
         self._heading = pn.pane.HTML(heading("Cost E", *keys), margin=(2, 10), sizing_mode="stretch_width")
         self._pane = pn.pane.Bokeh(plot, height=190, min_height=190, sizing_mode="stretch_width", margin=0)
@@ -62,6 +62,8 @@ class LandscapeCard(Follower):
         current = preview is not None and preview.base is state.lane.entry(state.frame)
         land = preview.landscape if preview is not None and current else None
         self.note.object = _note(preview.note) if preview is not None and current and preview.note else ""
+        if preview is not None and current and land is None and preview.base.tracking.tracker == state.lane.tracker:
+            return  # it comes in a moment
         if preview is None or land is None:
             self.image.data = {"cost": [], "x": [], "y": [], "w": [], "h": []}
             self.samples.data = {"x": [], "y": [], "colour": [], "marker": [], "size": []}

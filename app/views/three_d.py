@@ -105,6 +105,7 @@ class ThreeD:
         if not self._awaited:
             self._seen = max(self._seen, self._sent)
             self._all_shown.set()
+            self._state.pictured += 1
 
     def _on_orbit(self, right: float, up: float, magnify: float) -> None:
         self._moved = time.monotonic()

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from spf.render.scene import Lines, Mesh, Points
 from spf.render.surface import Shell, vertex_normals
 
-__all__ = ["Actor", "LinesActor", "MeshActor", "PointsActor", "ShellActor"]
+__all__ = ["Actor", "LinesActor", "MeshActor", "PointsActor", "ShellActor", "coarsened"]
+
+_FEWER = 0.67  # share of a mesh's faces that a coarse one does without
 
 
 class Actor(Protocol):
@@ -121,6 +123,14 @@ class LinesActor(_Painted):
         colours = np.broadcast_to(np.asarray(item.colour), item.paths.shape)
         self._paint(item.paths.reshape(-1, 3), colours.reshape(-1, 3))
         self.actor.prop.line_width = max(1.0, item.width * scale)
+
+
+def coarsened(mesh: Mesh) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+    """Return which vertices a coarser mesh keeps, (K,), and its faces among them, (F, 3); they fit it in any pose."""
+    full = pv.PolyData.from_regular_faces(mesh.vertices.astype(float), mesh.faces.astype(int))
+    full.point_data["kept"] = np.arange(len(mesh.vertices))
+    coarse = full.decimate_pro(_FEWER, preserve_topology=True)
+    return np.asarray(coarse.point_data["kept"], np.intp), coarse.regular_faces.astype(np.int32)
 
 
 def _cells(indices: NDArray[Any]) -> pv.CellArray:

@@ -17,6 +17,10 @@ Colour = tuple[int, ...]  # RGB, 0 to 255
 _BONES = tuple((0 if i % 4 == 1 else i - 1, i) for i in range(1, 21))
 _OUTLINE, _BACKGROUND = (25, 25, 25), (42, 48, 56)
 _FRACTION = 4  # bits of a pixel's fraction that OpenCV takes
+_LEVELS = np.arange(256, dtype=np.uint8)[:, None]
+#: RGB by brightness, (256, 1, 3): one that every colour vision orders alike, and a quiet grey.
+_CIVIDIS: NDArray[np.uint8] = np.ascontiguousarray(cv2.applyColorMap(_LEVELS, cv2.COLORMAP_CIVIDIS)[..., ::-1]).astype(np.uint8)
+_GREY = ((70 + 60 * np.linspace(0, 1, 256))[:, None, None] * (0.94, 1.0, 1.08)).astype(np.uint8)
 
 
 class Skeleton(NamedTuple):
@@ -89,27 +93,31 @@ def box_around(camera: Camera, points: NDArray[np.float64], *, ratio: float = 4 
 
 def _coloured(depth: NDArray[np.float32], region: NDArray[np.bool_] | None) -> NDArray[np.uint8]:
     seen = depth > 0
-    picture = np.full((*depth.shape, 3), _BACKGROUND, np.uint8)
+    picture = np.empty((*depth.shape, 3), np.uint8)
+    picture[:] = _BACKGROUND
     if not seen.any():
         return picture
     if region is None or not region.any():
-        picture[seen] = _cividis(depth, seen)[seen]
-        return picture
-    near, far = np.percentile(depth[seen], [1, 99])
-    grey = 70 + 60 * (1 - np.clip((depth - near) / max(far - near, 1e-3), 0, 1))
-    picture[seen] = (grey[..., None] * np.array([0.94, 1.0, 1.08]))[seen].astype(np.uint8)
+        return _painted(picture, seen, depth, seen, _CIVIDIS)
+    picture = _painted(picture, seen, depth, seen, _GREY, least=1e-3)
     hand = region & seen
-    if hand.any():
-        picture[hand] = _cividis(depth, hand)[hand]
-    return picture
+    return _painted(picture, hand, depth, hand, _CIVIDIS) if hand.any() else picture
 
 
-def _cividis(depth: NDArray[np.float32], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """Colours that every colour vision orders alike, over the range of depth within a mask."""
-    near, far = np.percentile(depth[mask], [1, 99])
-    level = 255 * (1 - np.clip((depth - near) / max(far - near, 0.02), 0, 1))
-    bgr = cv2.applyColorMap(level.astype(np.uint8), cv2.COLORMAP_CIVIDIS)
-    return np.asarray(bgr[:, :, ::-1], dtype=np.uint8)
+def _painted(
+    picture: NDArray[np.uint8],
+    where: NDArray[np.bool_],
+    depth: NDArray[np.float32],
+    span: NDArray[np.bool_],
+    palette: NDArray[np.uint8],
+    least: float = 0.02,
+) -> NDArray[np.uint8]:
+    """Paint what is in a mask by its depth; the palette goes over the range of depth in it, at least ``least`` metres."""
+    near, far = np.percentile(depth[span], [1, 99])
+    reach = max(float(far - near), least)
+    level = cv2.convertScaleAbs(np.clip(near + reach - depth, 0, reach), alpha=255 / reach)
+    coloured = cv2.applyColorMap(level, palette)
+    return np.asarray(cv2.copyTo(coloured, where.astype(np.uint8), picture), dtype=np.uint8)
 
 
 def _draw(canvas: NDArray[np.uint8], camera: Camera, skeleton: Skeleton, box: Box, scale: float) -> None:
