@@ -136,11 +136,10 @@ class _Job(NamedTuple):
 
 
 def _seen_again(base: Entry, frame: Frame) -> Observation:
-    """What was looked at; where a lost hand was found again, the place is that of the estimate."""
-    before = base.before
-    centre = base.result.pose[:3] if before.lost else before.filter.estimate[:3]
-    how = base.tracking
-    return observe(seen_through(frame, how.start.shape.lens), centre, reach_of(how.hand))
+    """What was looked at."""
+    how, place = base.tracking, base.result.place
+    assert place is not None
+    return observe(seen_through(frame, how.start.shape.lens), place, reach_of(how.hand))
 
 
 def _preview(job: _Job, observation: Observation) -> Preview:

@@ -23,10 +23,10 @@ from spf.hand.kinematics import relative_to_camera
 from spf.hand.model import Side
 from spf.hand.shape import HandShape
 from spf.hypotheses import Hypothesis, hypotheses_of
-from spf.learned.network import available_network
+from spf.learned.network import Network, available_network
 from spf.lens import Through, is_believable, lens_of, lenses_for
-from spf.locate import reach_of, strangeness
-from spf.observation import Observation, observe
+from spf.locate import reach_of, seen_at, strangeness
+from spf.observation import Observation, Suggestion, observe
 from spf.search import SearchSettings, size_penalty
 
 __all__ = ["Doubted", "Start", "find_start"]
@@ -43,6 +43,7 @@ _CLEAR_MARGIN = 0.03  # … when the other side is this much worse
 _VALIDATION_FRAMES = 16
 _CALIBRATION_FRAMES = 48
 _VIEWS = 12
+_LEAST_FRAMES = 4  # that a hypothesis is fitted in
 
 
 class Start(NamedTuple):
@@ -158,6 +159,7 @@ def find_start(
         best = _through_a_lens(stated, _calibrated(frames, best, rng, report), rng, report)
         frames = Through(stated, best.shape.lens)
     index, pose, reference = _first_held(frames, best, rng)
+    pose, reference = _settled(frames[index], best.shape, pose, reference, rng)
     report("Ready", 1.0)
     return Start(index, pose, reference, best.shape, best.energy, best.margin)
 
@@ -191,7 +193,7 @@ def _best_followed(
 ) -> _Followed:
     """Track every hypothesis for some frames, at a size fitted to them, and return the one that explains them best."""
     network, _ = available_network()
-    ahead = frames[index : index + _VALIDATION_FRAMES]
+    ahead = _some(frames[index : index + _VALIDATION_FRAMES])
     rated: list[tuple[float, Hypothesis]] = []
     for hypothesis in hypotheses:
         fitted = hypothesis
@@ -218,6 +220,27 @@ def _best_followed(
     return _Followed(index, chosen.shape, chosen.pose, np.eye(3), energy, min(others) - energy if others else 1.0)
 
 
+def _some(frames: Sequence[Frame]) -> Sequence[Frame]:
+    """Frames enough to fit a hypothesis: a last one that is the only one or nearly so is shown again, as if nothing moved."""
+    again = [
+        frames[-1]._replace(time=frames[-1].time + step / 30) for step in range(1, _LEAST_FRAMES + 1 - len(frames))
+    ]
+    return [*frames, *again] if again else frames
+
+
+def _settled(
+    frame: Frame, shape: HandShape, pose: Array, reference: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Track a hand in one frame until its pose has settled: (pose, reference)."""
+    network, _ = available_network()
+    again = [frame._replace(time=frame.time + step / 30) for step in range(_LEAST_FRAMES)]
+    tracked = _track(Hypothesis(shape, pose, 0.0), again, rng, reference, network)
+    if not tracked:
+        return pose, reference
+    _, state, _ = min(tracked, key=lambda item: item[2].estimate_golden)
+    return state.estimate, state.reference
+
+
 def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator) -> tuple[int, Array, Array]:
     """Track backwards from where the start was found for as long as the hand is there: (frame, pose, reference)."""
     backwards = [frames[index]._replace(time=-frames[index].time) for index in range(start.frame, -1, -1)]
@@ -232,7 +255,11 @@ def _first_held(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
 
 
 def _track(
-    hypothesis: Hypothesis, frames: Sequence[Frame], rng: np.random.Generator, reference: Array | None = None
+    hypothesis: Hypothesis,
+    frames: Sequence[Frame],
+    rng: np.random.Generator,
+    reference: Array | None = None,
+    network: Network | None = None,
 ) -> list[tuple[Observation, State, StepInfo]]:
     """Track a hypothesis with the default filter, until nothing is seen any more."""
     hand, settings = hypothesis.shape.hand(), smart.SpfSettings()
@@ -244,6 +271,9 @@ def _track(
         observation = observe(frame, state.estimate[:3], reach_of(hand))
         if observation.is_empty:
             break
+        if network is not None:
+            seen = seen_at(network, frame, hand, state.estimate, state.reference)
+            observation = observation._replace(suggestions=tuple(Suggestion(g.pose, g.reference) for g in seen))
         state, info = smart.step(rng, state, observation, hand, settings, spheres=spheres)
         result.append((observation, state, info))
     return result

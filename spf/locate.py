@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import scaled_spheres
 from spf.filters import smart
+from spf.filters.proposals import curl_digits
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Hand, Side, load_hand
@@ -23,12 +24,12 @@ from spf.parallel import map_threads
 from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
 from spf.segmentation import Region
 
-__all__ = ["Seeds", "around", "locate", "reach_of", "strangeness", "suggested"]
+__all__ = ["Seeds", "around", "locate", "polished", "reach_of", "seen_at", "strangeness", "strangeness_to", "suggested"]
 
 Array = NDArray[np.float64]
-_POLISHED = 10  # hypotheses that SMD is run from
+_POLISHED, _GLANCED = 10, 4  # hypotheses that SMD is run from, in a search and in a glance
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
-_LOOKS = (0.1, 0.3, 0.5, 0.7, 0.9)  # quantiles of a region, along its longest axis, that the network looks at
+_LOOKS, _AROUND = 7, 0.07  # places of a region that the network looks at, and m around each that it stands for
 _PLACE, _PLACES = 0.08, 3  # m within which guesses are of one place, and the most places of a side
 _STRANGE = 0.1  # golden energy of a nat per joint under the density …
 _FAMILIAR = 8.0  # … of a hand that the network knows well
@@ -76,6 +77,24 @@ def locate(
     return sorted(_polish(problem, cost, _spaced(hand, found, _POLISHED), rng), key=lambda item: item[2])
 
 
+def polished(
+    hand: Hand, observation: Observation, poses: Array, rng: np.random.Generator
+) -> list[tuple[float, Array, float]]:
+    """Run SMD from the best of some poses (N, D), bend the digits of what comes out, and run it again.
+
+    The same as :func:`locate` gives, without any search. A hand is told from an arm by how well it can be fitted.
+    """
+    cost = smart.SpfSettings()
+    problem = make_problem(hand, observation, cost, np.eye(3), rng)
+    energies, _ = golden(problem, poses)
+    order = np.argsort(energies)
+    rough = _spaced(hand, Hypotheses(poses[order], np.ones(len(poses)), energies[order]), _GLANCED)
+    first = _polish(problem, cost, rough, rng)
+    bent = np.array([curl_digits(problem, pose, energy)[0] for _, pose, energy in first])
+    second = Hypotheses(bent, rough.scales, np.array([energy for _, _, energy in first]))
+    return sorted(_polish(problem, cost, second, rng), key=lambda item: item[2])
+
+
 def _spaced(hand: Hand, found: Hypotheses, most: int) -> Hypotheses:
     """The best hypotheses that differ from each other."""
     kept: list[int] = []
@@ -121,20 +140,31 @@ def around(hand: Hand, pose: Array, rng: np.random.Generator) -> Seeds:
 def suggested(
     network: Network, frame: Frame, region: Region, sides: Sequence[Side], size: float | None
 ) -> dict[Side, list[Seeds]]:
-    """Let the network look along a region for hands of each side, of a size relative to the bundled mesh or of any.
+    """Let the network look all over a region for hands of each side, of a size relative to the bundled mesh or of any.
 
     Returns:
         What it suggests for each place where it sees a hand, as poses relative to the camera's axes; scales are relative
         to the bundled mesh, or 1 for a hand of known size.
     """
-    middle = region.points.mean(axis=0)
-    axis = np.linalg.svd(region.points - middle, full_matrices=False)[2][0]
-    along = np.quantile((region.points - middle) @ axis, _LOOKS)
     found: dict[Side, list[Guess]] = {side: [] for side in sides}
-    for place in along:
-        for guess in search_hand(network, frame.depth, frame.camera, middle + place * axis, size, sides):
+    for place in _looks(region.points):
+        for guess in search_hand(network, frame.depth, frame.camera, place, size, sides):
             found[guess.side].append(guess)
     return {side: [_seeds(those, size) for those in _places(every)] for side, every in found.items()}
+
+
+def _looks(points: Array) -> Array:
+    """Spread places over points (M, 3), the ends first, for a hand is at an end: (≤ _LOOKS, 3).
+
+    Each next one is the farthest from those before (Gonzalez 1985), moved to the middle of what is around it.
+    """
+    places = [points.mean(axis=0)]
+    apart = np.linalg.norm(points - places[0], axis=1)
+    while len(places) < _LOOKS and apart.max() > _AROUND:
+        end = points[int(np.argmax(apart))]
+        places.append(points[np.linalg.norm(points - end, axis=1) < _AROUND].mean(axis=0))
+        apart = np.minimum(apart, np.linalg.norm(points - end, axis=1))
+    return np.array(places)
 
 
 def _places(found: list[Guess]) -> list[list[Guess]]:
@@ -157,8 +187,19 @@ def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, 
     """
     if network is None:
         return 0.0
-    joints, size = joints_of(hand, pose, reference), hand.length / load_hand(hand.side).length
-    seen = guesses(network, frame.depth, frame.camera, joints.mean(axis=0), extent_of(size), (hand.side,))
+    seen = seen_at(network, frame, hand, pose, reference)
+    return strangeness_to(seen, hand, joints_of(hand, pose, reference))
+
+
+def seen_at(network: Network, frame: Frame, hand: Hand, pose: Array, reference: Array) -> list[Guess]:
+    """What the network makes of a frame around a pose (D,) relative to ``reference``: hands of that side, the best first."""
+    middle = joints_of(hand, pose, reference).mean(axis=0)
+    size = hand.length / load_hand(hand.side).length
+    return guesses(network, frame.depth, frame.camera, middle, extent_of(size), (hand.side,))
+
+
+def strangeness_to(seen: Sequence[Guess], hand: Hand, joints: Array) -> float:
+    """The same of joints (21, 3), m, for who has asked the network already; 0 where it was not asked."""
 
     def log_density(guess: Guess) -> float:
         spread = 0.5 * guess.joint_sigma  # of the Laplace density exp(-r/b)/(8 π b³)
@@ -166,7 +207,7 @@ def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, 
         per_joint = -apart / spread - 3.0 * np.log(spread / hand.length)
         return float(per_joint.mean()) + guess.log_weight / len(joints)
 
-    return _STRANGE * max(_FAMILIAR - max(log_density(guess) for guess in seen), 0.0)
+    return _STRANGE * max(_FAMILIAR - max((log_density(guess) for guess in seen), default=_FAMILIAR), 0.0)
 
 
 def _seeds(found: list[Guess], size: float | None) -> Seeds:

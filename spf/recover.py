@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +13,16 @@ from spf.frame import Frame
 from spf.hand.kinematics import rotation_about
 from spf.hand.model import Hand, load_hand
 from spf.learned.network import Network
-from spf.locate import Seeds, around, locate, reach_of, strangeness, suggested
-from spf.observation import observe
+from spf.locate import Seeds, around, locate, polished, reach_of, strangeness, suggested
+from spf.observation import Observation, observe
 from spf.search import SearchSettings
-from spf.segmentation import Region, find_plane, find_regions
+from spf.segmentation import find_plane, find_regions
 
-__all__ = ["recover"]
+__all__ = ["glance", "recover"]
 
 Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
+_REGIONS = 2  # of the frame, the nearest, that are looked at
 _SEEN = 0.3  # presence of a hand, in the network's eyes, from which it is looked for in a place
 _JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose
 
@@ -53,14 +55,15 @@ def recover(
     settings = SearchSettings(islands=10, kept=4, generations=25, scale_spread=0.0)
     remembered = 1.0 / (1.0 + missing / _FORGOTTEN)
 
-    def unlikely(pose: Array) -> float:
-        turn = Rotation.from_matrix(rotation_about(pose[3:6]) @ rotation_about(last[3:6]).T).magnitude()
-        return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi) * remembered
-
     def believed(found: list[tuple[float, Array, float]]) -> Array | None:
         near = [(energy, pose) for _, pose, energy in found if np.linalg.norm(pose[:3] - last[:3]) < within]
         rated = [
-            (energy + unlikely(pose) + strangeness(network, frame, hand, pose, np.eye(3)), pose)
+            (
+                energy
+                + remembered * _unlikely(pose, last, within)
+                + strangeness(network, frame, hand, pose, np.eye(3)),
+                pose,
+            )
             for energy, pose in near
         ]
         best = min(rated, key=lambda item: item[0], default=None)
@@ -71,23 +74,71 @@ def recover(
         pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
         if pose is not None:
             return pose
-    plane = find_plane(frame, rng)
-    for region in find_regions(frame, plane)[:2]:
-        observation = observe(frame, region.centre, region.radius, plane=plane)
-        if observation.is_empty:
-            continue
-        for seeds in _places(network, frame, region, hand, last):
-            pose = believed(locate(hand, observation, region.points, settings, rng, seeds))
-            if pose is not None:
-                return pose
+    for place in _places(network, frame, hand, last, rng):
+        pose = believed(locate(hand, place.observation, place.points, settings, rng, place.seeds))
+        if pose is not None:
+            return pose
     return None
 
 
-def _places(network: Network | None, frame: Frame, region: Region, hand: Hand, last: Array) -> Sequence[Seeds | None]:
-    """Where in a region to begin: places where the network sees a hand, the nearest first, or anywhere without it."""
-    if network is None:
-        return [None]
+def glance(
+    frame: Frame, hand: Hand, last: Array, within: float, network: Network, rng: np.random.Generator
+) -> tuple[float, Array] | None:
+    """Look where the network sees a hand, without a search: for a tracker that may be on something else.
+
+    Args:
+        frame, hand, network, rng: as of :func:`recover`.
+        last: (D,) where the hand was, relative to the camera's axes.
+        within: m that its palm can be away from there.
+
+    Returns:
+        (golden energy with what strangeness, a jump and a turn are charged, pose (D,) relative to the camera's axes) of the
+        best, or None when there is none.
+    """
+    best: tuple[float, Array] | None = None
+    for place in _places(network, frame, hand, last, rng):
+        assert place.seeds is not None
+        for _, pose, energy in polished(hand, place.observation, place.seeds.poses, rng):
+            if np.linalg.norm(pose[:3] - last[:3]) > within:
+                continue
+            charged = energy + _unlikely(pose, last, within) + strangeness(network, frame, hand, pose, np.eye(3))
+            if best is None or charged < best[0]:
+                best = charged, pose
+    return best
+
+
+def _unlikely(pose: Array, last: Array, within: float) -> float:
+    """What a pose is charged for being elsewhere, and held otherwise, than the last one (D,); both by the camera's axes."""
+    turn = Rotation.from_matrix(rotation_about(pose[3:6]) @ rotation_about(last[3:6]).T).magnitude()
+    return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi)
+
+
+class _Place(NamedTuple):
+    """Where a hand may be: what is seen around it, points of it, and where a search begins (None: anywhere)."""
+
+    observation: Observation
+    points: Array
+    seeds: Seeds | None
+
+
+def _places(
+    network: Network | None, frame: Frame, hand: Hand, last: Array, rng: np.random.Generator
+) -> Iterator[_Place]:
+    """Go over the places where the network sees a hand, the nearest to the last one first; without it, over whole regions.
+
+    What is seen is cut out around the place, as it is for the tracker: so golden energies compare with the tracker's.
+    """
+    plane = find_plane(frame, rng)
+    regions = find_regions(frame, plane)
     size = hand.length / load_hand(hand.side).length
-    places = suggested(network, frame, region, (hand.side,), size)[hand.side]
-    seen = [seeds for seeds in places if seeds.presence > _SEEN]
-    return sorted(seen, key=lambda seeds: float(np.linalg.norm(seeds.poses[0, :3] - last[:3])))
+    for region in regions[:_REGIONS]:
+        if network is None:
+            looked = observe(frame, region.centre, region.radius, plane=plane)
+            if not looked.is_empty:
+                yield _Place(looked, region.points, None)
+            continue
+        seen = [s for s in suggested(network, frame, region, (hand.side,), size)[hand.side] if s.presence > _SEEN]
+        for seeds in sorted(seen, key=lambda seeds: float(np.linalg.norm(seeds.poses[0, :3] - last[:3]))):
+            looked = observe(frame, seeds.poses[0, :3], reach_of(hand), plane=plane)
+            if not looked.is_empty:
+                yield _Place(looked, region.points, seeds)

@@ -21,7 +21,7 @@ from spf.track import TrackState
 
 __all__ = ["read_states", "write_states"]
 
-_NUMBERS = ("time", "lost", "bad", "fresh", "golden", "missing")
+_NUMBERS = ("time", "lost", "bad", "fresh", "golden", "missing", "doubts")
 
 
 def write_states(states: Mapping[int, TrackState], path: Path) -> None:
@@ -77,11 +77,11 @@ def _states_of(arrays: dict[str, NDArray[Any]]) -> dict[int, TrackState]:
     for i, frame in enumerate(arrays["frame"]):
         of = slice(int(ends[i] - arrays["count"][i]), int(ends[i]))
         history = arrays["history"][int(told[i] - arrays["histories"][i]) : int(told[i])]
-        time, lost, bad, fresh, golden, missing = (arrays[name][i] for name in _NUMBERS)
+        time, lost, bad, fresh, golden, missing, doubts = (arrays[name][i] for name in _NUMBERS)
         particles = ParticleSet(*(arrays[name][of] for name in ParticleSet._fields))
         filter_state = State(particles, arrays["reference"][i], arrays["estimate"][i], float(time))
         states[int(frame)] = TrackState(
             filter_state, bool(lost), tuple(float(value) for value in history), int(bad), bool(fresh), float(golden),
-            int(missing),
+            int(missing), int(doubts),
         )  # fmt: skip
     return states

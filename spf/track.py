@@ -17,16 +17,16 @@ from spf.cost.spheres import digit_spheres
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of, relative_to_camera
-from spf.hand.model import Hand, load_hand
+from spf.hand.model import Hand
 from spf.initialise import Start
 from spf.kernels.cost import Spheres
-from spf.learned.guesses import extent_of, guesses
+from spf.learned.guesses import Guess
 from spf.learned.network import Network, available_network
 from spf.lens import as_stated, seen_through
-from spf.locate import reach_of
+from spf.locate import reach_of, seen_at, strangeness_to
 from spf.observation import Observation, Suggestion, observe
 from spf.parallel import map_threads
-from spf.recover import recover
+from spf.recover import glance, recover
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
@@ -37,7 +37,12 @@ _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
 _FIRST_EFFORT = 3.0
 _FRAME = 1.0 / 30.0  # s
-_NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a lost hand is believed in, and how much it grows a frame
+_STRANGE = 0.3  # golden energy that an estimate is charged by the network, over which it is doubted
+_ELSEWHERE, _CLEARLY = (
+    0.25,
+    0.05,
+)  # m within which a doubted hand is looked for, and golden energy that it must be better by
+_NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a hand is looked for in, and how much it grows a frame
 
 
 class Tracking(NamedTuple):
@@ -73,6 +78,7 @@ class TrackState(NamedTuple):
         fresh: whether the pose was just found and no frame has refined it.
         golden: golden energy of the last estimate; 1 when there is none.
         missing: frames since the hand was lost.
+        doubts: frames in a row in which the estimate may be on something else than the hand.
     """
 
     filter: State
@@ -82,6 +88,7 @@ class TrackState(NamedTuple):
     fresh: bool
     golden: float
     missing: int
+    doubts: int = 0
 
 
 class TrackedFrame(NamedTuple):
@@ -102,6 +109,7 @@ class TrackedFrame(NamedTuple):
         timings: seconds by stage.
         info: everything that happened in the filter; None while lost.
         observation: what was seen; None while lost.
+        place: (3,) m, around which it was looked for; None while lost, and of a run that was read.
     """
 
     index: int  # type: ignore[assignment]  # a frame has an index; a tuple's method of that name is not missed
@@ -119,6 +127,7 @@ class TrackedFrame(NamedTuple):
     timings: dict[str, float]
     info: StepInfo | None
     observation: Observation | None
+    place: Array | None = None
 
 
 def begin(
@@ -157,16 +166,23 @@ def track_frame(
     if was_lost:
         state = _sought(tracking, state, frame, rng)
     searched = time.perf_counter()
-    observation = _look(tracking, state, frame)
+    looked = _look(tracking, state, frame)
     observed = time.perf_counter()
-    if observation.is_empty:
+    if looked.observation.is_empty:
         state = state._replace(lost=True, missing=state.missing + 1)
         return state, _lost(tracking, state, frame, began)
-    filter_state, info = TRACKERS[tracking.tracker].step(
-        rng, state.filter, observation, tracking.hand, tracking.settings,
-        spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
-    )  # fmt: skip
-    new = _judged(tracking, state, filter_state, info)
+    new, info = _stepped(tracking, state, looked.observation, rng, record)
+    doubts = _doubts(tracking, state, new, info, looked.seen)
+    observation = looked.observation
+    if (
+        doubts and doubts & (doubts - 1) == 0
+    ):  # the first, the second, the fourth …: a glance takes several frames' time
+        elsewhere = _glanced(tracking, state, new, info, looked.seen, frame, rng)
+        if elsewhere is not None:
+            state, doubts = elsewhere, 0
+            observation = _look(tracking, state, frame).observation
+            new, info = _stepped(tracking, state, observation, rng, record)
+    new = new._replace(doubts=doubts)
     joints = stated_joints(tracking, info.estimate, info.reference)
     timings = {
         "search": searched - began,
@@ -177,7 +193,7 @@ def track_frame(
     result = TrackedFrame(
         frame.index, frame.time, info.estimate, info.reference, joints, new.lost, was_lost and not new.lost,
         info.estimate_log_likelihood, info.ess, info.estimate_golden, info.estimate_overlap, seconds, timings,
-        info, observation,
+        info, observation, state.filter.estimate[:3],
     )  # fmt: skip
     return new, result
 
@@ -187,24 +203,67 @@ def stated_joints(tracking: Tracking, pose: Array, reference: Array) -> Array:
     return as_stated(joints_of(tracking.hand, pose, reference), tracking.start.shape.lens)
 
 
-def _look(tracking: Tracking, state: TrackState, frame: Frame) -> Observation:
+class _Looked(NamedTuple):
+    """What is seen of a frame, and what the network makes of it where the hand was: nothing if it is not asked."""
+
+    observation: Observation
+    seen: list[Guess]
+
+
+def _look(tracking: Tracking, state: TrackState, frame: Frame) -> _Looked:
     """Observe the surface around where the hand was, while the network looks at the same place."""
     parts: list[Callable[[], Any]] = [
         lambda: observe(frame, state.filter.estimate[:3], reach_of(tracking.hand)),
-        lambda: _suggestions(tracking, state, frame),
+        lambda: _seen(tracking, state, frame),
     ]
-    observation, suggestions = map_threads(lambda part: part(), parts)
-    return observation._replace(suggestions=suggestions)  # type: ignore[no-any-return]
+    observation, seen = map_threads(lambda part: part(), parts)
+    suggestions = tuple(Suggestion(guess.pose, guess.reference) for guess in seen)
+    return _Looked(observation._replace(suggestions=suggestions), seen)
 
 
-def _suggestions(tracking: Tracking, state: TrackState, frame: Frame) -> tuple[Suggestion, ...]:
+def _seen(tracking: Tracking, state: TrackState, frame: Frame) -> list[Guess]:
     """Ask the network, if the tracker listens to it."""
     if tracking.network is None or not getattr(tracking.settings, "learned", False):
-        return ()
-    middle = joints_of(tracking.hand, state.filter.estimate, state.filter.reference).mean(axis=0)
-    size = tracking.hand.length / load_hand(tracking.hand.side).length
-    seen = guesses(tracking.network, frame.depth, frame.camera, middle, extent_of(size), (tracking.hand.side,))
-    return tuple(Suggestion(guess.pose, guess.reference) for guess in seen)
+        return []
+    return seen_at(tracking.network, frame, tracking.hand, state.filter.estimate, state.filter.reference)
+
+
+def _stepped(
+    tracking: Tracking, state: TrackState, observation: Observation, rng: np.random.Generator, record: bool
+) -> tuple[TrackState, StepInfo]:
+    filter_state, info = TRACKERS[tracking.tracker].step(
+        rng, state.filter, observation, tracking.hand, tracking.settings,
+        spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
+    )  # fmt: skip
+    return _judged(tracking, state, filter_state, info), info
+
+
+def _strange(tracking: Tracking, info: StepInfo, seen: list[Guess]) -> float:
+    """Golden energy of the estimate, and what it is charged for being strange to the network."""
+    joints = joints_of(tracking.hand, info.estimate, info.reference)
+    return info.estimate_golden + strangeness_to(seen, tracking.hand, joints)
+
+
+def _doubts(tracking: Tracking, state: TrackState, new: TrackState, info: StepInfo, seen: list[Guess]) -> int:
+    """Count the frames in a row whose estimate explains the depth poorly, or is no hand in the network's eyes."""
+    if not seen or state.lost or state.fresh:
+        return 0
+    strangeness = _strange(tracking, info, seen) - info.estimate_golden
+    doubted = info.estimate_golden > _believable(state, tracking) or strangeness > _STRANGE
+    return new.doubts + 1 if doubted else 0
+
+
+def _glanced(
+    tracking: Tracking, state: TrackState, new: TrackState, info: StepInfo, seen: list[Guess], frame: Frame,
+    rng: np.random.Generator,
+) -> TrackState | None:  # fmt: skip
+    """Look elsewhere when the estimate is doubted; a state that begins there, when a hand explains clearly more there."""
+    assert tracking.network is not None
+    last = relative_to_camera(state.filter.estimate, state.filter.reference)
+    found = glance(frame, tracking.hand, last, _NEAR + _STRIDE, tracking.network, rng)
+    if found is None or found[0] > _strange(tracking, info, seen) - _CLEARLY:
+        return None
+    return _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)._replace(history=new.history)
 
 
 def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.Generator) -> TrackState:
@@ -238,7 +297,7 @@ def _judged(tracking: Tracking, state: TrackState, filter_state: State, info: St
     history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
     lost = poor if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
-    return TrackState(filter_state, lost, history, count, False, golden, missing)
+    return TrackState(filter_state, lost, history, count, False, golden, missing, state.doubts)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:

@@ -47,6 +47,7 @@ _USUAL = ("medium", "body", "table", "second_hand")
 _MARGIN = 0.06  # m around the palm that has to stay in the view
 _SEEN = 0.4  # of the pixels that the hand was seen in before, at least
 _WAYS = (1.0, 1.0, 0.5)  # a jump goes less along the line of sight than across it
+_CHECKED = 4  # frames after the jump, spread, in which it must be
 _DRAWS = 500
 
 
@@ -103,8 +104,9 @@ def kidnapped(session: SyntheticSession, at: int, rng: np.random.Generator) -> S
             continue
         stage = session.stage._replace(trajectory=trajectory._replace(poses=poses, orientations=orientations))
         made = dataclasses.replace(session, stage=stage)
-        if made.hand_mask(at).sum() > _SEEN * seen:  # not behind what else is in the scene, nor seen end on
-            return made
+        after = np.linspace(at, len(made) - 1, _CHECKED).astype(int)
+        if all(made.hand_mask(int(index)).sum() > _SEEN * seen for index in after):
+            return made  # neither behind what else is in the scene, nor in it, nor seen end on
     raise ValueError(f"The hand of {session.name} cannot jump anywhere without leaving the view.")
 
 
@@ -182,7 +184,11 @@ def _followed(
     for frame in frames:
         state, result = track_frame(tracking, state, frame)
         joints = joints_of(own, result.pose, result.reference)
-        above.append(_above_floor_mm(joints, seen_through(frame, tracking.start.shape.lens), labelled))
+        if isinstance(session, SyntheticSession):
+            assert frame.truth is not None
+            above.append(_apart_mm(joints, frame.truth.joints))
+        else:
+            above.append(_above_floor_mm(joints, seen_through(frame, tracking.start.shape.lens), labelled))
         lost.append(bool(result.lost))
         seconds.append(result.seconds)
     held = np.array([a is not None and a < _HELD_MM for a in above])
@@ -200,8 +206,11 @@ def _above_floor_mm(joints: Array, frame: Frame, labelled: Hand) -> float | None
     floor = floor_of(labelled, frame, np.random.default_rng(frame.index), exact=True)
     if floor is None:
         return None
-    best = joints_of(labelled, floor.pose, floor.reference)
-    return round(1e3 * float(np.linalg.norm(joints - best, axis=1).mean()), 2)
+    return _apart_mm(joints, joints_of(labelled, floor.pose, floor.reference))
+
+
+def _apart_mm(joints: Array, others: Array) -> float:
+    return round(1e3 * float(np.linalg.norm(joints - others, axis=1).mean()), 2)
 
 
 def _told(one: dict[str, Any]) -> str:

@@ -19,7 +19,9 @@ _OUTLINE, _BACKGROUND = (25, 25, 25), (42, 48, 56)
 _FRACTION = 4  # bits of a pixel's fraction that OpenCV takes
 _LEVELS = np.arange(256, dtype=np.uint8)[:, None]
 #: RGB by brightness, (256, 1, 3): one that every colour vision orders alike, and a quiet grey.
-_CIVIDIS: NDArray[np.uint8] = np.ascontiguousarray(cv2.applyColorMap(_LEVELS, cv2.COLORMAP_CIVIDIS)[..., ::-1]).astype(np.uint8)
+_CIVIDIS: NDArray[np.uint8] = np.ascontiguousarray(cv2.applyColorMap(_LEVELS, cv2.COLORMAP_CIVIDIS)[..., ::-1]).astype(
+    np.uint8
+)
 _GREY = ((70 + 60 * np.linspace(0, 1, 256))[:, None, None] * (0.94, 1.0, 1.08)).astype(np.uint8)
 
 

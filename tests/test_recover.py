@@ -1,0 +1,50 @@
+"""A hand that is lost is found again, and one that the tracker mistakes something else for is noticed by the network."""
+
+import numpy as np
+import pytest
+
+from benchmarks.holds.kidnaps import kidnapped
+from benchmarks.holds.sessions import session_settings
+from spf.hand.model import load_hand
+from spf.learned.network import available_network
+from spf.locate import _AROUND, _LOOKS, _looks, strangeness_to
+from spf.prepare import prepare
+from spf.synthetic import synthesise
+from spf.track import begin, track_frame
+from spf.trackers import make_settings
+
+needs_network = pytest.mark.skipif(available_network()[0] is None, reason="the network or its runtime is missing")
+
+
+def error_of(result, frame):
+    return float(np.linalg.norm(result.joints - frame.truth.joints, axis=1).mean())
+
+
+@needs_network
+@pytest.mark.parametrize(("kind", "number"), [("medium", 4), ("body", 1)])
+def test_a_hand_that_jumps_is_held_at_once_and_not_taken_for_what_is_now_where_it_was(kind, number):
+    at = 3
+    session = kidnapped(synthesise(session_settings(kind, number, 8)), at, np.random.default_rng([number, 11]))
+    start = prepare(session, init="truth", seed=0)
+    tracking, state = begin("spf", make_settings("spf"), start, 0, time=float(session.times[0]))
+    errors = []
+    for frame in session:
+        state, result = track_frame(tracking, state, frame)
+        errors.append(error_of(result, frame))
+        assert not result.lost
+    assert np.linalg.norm(session[at].truth.joints - session[at - 1].truth.joints, axis=1).mean() > 0.1
+    assert max(errors[at + 2 :]) < 0.02
+
+
+def test_the_network_looks_at_both_ends_of_what_is_there(rng):
+    arm = np.column_stack([np.linspace(-0.3, 0.3, 500), *rng.normal(scale=0.01, size=(2, 500))])
+    places = _looks(arm)
+    assert len(places) <= _LOOKS
+    for end in (arm[0], arm[-1]):
+        assert np.linalg.norm(places - end, axis=1).min() < _AROUND
+    ball = rng.normal(scale=0.01, size=(300, 3))
+    assert len(_looks(ball)) == 1
+
+
+def test_nothing_is_strange_to_a_network_that_is_not_asked():
+    assert strangeness_to([], load_hand("right"), np.zeros((21, 3))) == 0.0
