@@ -12,6 +12,7 @@ import param
 from app.address import Address, follow_in, place_of
 from app.controller import Controller
 from app.keeper import Keeper
+from app.posing import Posing
 from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
@@ -29,6 +30,7 @@ from app.views.live_card import LiveCard
 from app.views.messages import Messages
 from app.views.modes import Modes
 from app.views.names import Names
+from app.views.pose_tab import PoseTab
 from app.views.runs_card import RunsCard
 from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
@@ -66,6 +68,8 @@ def page() -> pmu.Page:
     shelf, presets = Shelf(), Presets()
     controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf))
     reruns, previewer = Reruns(controller, shelf), Previewer(state)
+    posing = Posing(controller, shelf.folder)
+    modes.detail.offer("pose", lambda: PoseTab(posing))
     address = Address(state, controller, reruns, samples)
     session = SessionCard(state, controller.open, samples, uploads)
     lanes, settings = LanesCard(state, controller), SettingsCard(state, presets)
