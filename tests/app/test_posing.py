@@ -72,11 +72,20 @@ def test_entries_and_shape_keep_to_what_a_hand_can(posing):
     posing.set_shape("scale", 9.0)
     assert posing.placed is before
     assert "no human hand" in posing.state.error
-    seen = pixels_of(before, posing.seen())
+
+
+def test_a_hand_of_the_other_side_lies_where_the_first_did(posing):
+    def across():
+        seen = pixels_of(posing.placed, posing.seen())
+        return np.subtract(seen["thumb_tip"], seen["little_tip"])
+
+    before = across()
     posing.set_side("left")
     assert posing.placed.hand.side == "left"
-    turned = pixels_of(posing.placed, posing.seen())
-    assert all(np.hypot(*np.subtract(turned[name], seen[name])) < 25 for name in seen)
+    turned = across()
+    assert before @ turned > 0.8 * np.linalg.norm(before) * np.linalg.norm(turned)
+    posing.undo()
+    assert posing.placed.hand.side == "right"
 
 
 def test_the_shape_is_measured_and_compared(posing, act):
