@@ -40,7 +40,7 @@ class PoseControls:
         self._group.param.watch(self._show_group, "value")
         self._buttons = {
             "fit": self._button("Fit from here", "auto_fix_high", posing.fit, "contained"),
-            "undo": self._button("Undo", "undo", posing.undo),
+            "undo": self._button("Undo pose", "undo", posing.undo),
             "suggest": self._button("Suggest a pose", "search", posing.suggest),
             "tracked": self._button("As tracked", "my_location", posing.take_tracked),
             "use": self._button("Use as first pose", "flag", posing.use, "contained"),

@@ -30,10 +30,7 @@ class ShapeControls:
             "margin": (3, 3),
             "sizing_mode": "stretch_width",
         }
-        self._measure = pmu.Button(
-            label="Fit shape", icon="straighten", on_click=self._on_measure, **button,
-            description="Tracks up to 48 frames from the one shown on, and fits size, lengths and thickness to their depth.",
-        )  # fmt: skip
+        self._measure = pmu.Button(label="Fit shape", icon="straighten", on_click=self._on_measure, **button)
         self._save = pmu.Button(label="Save hand", icon="download", on_click=self._on_save, **button)
         self._side = pmu.RadioButtonGroup(
             options={"Right hand": "right", "Left hand": "left"}, value="right", size="small", margin=(4, 3),
@@ -103,7 +100,10 @@ class ShapeControls:
 
 def _told(placed: Placed, before: Placed | None) -> str:
     """HTML: the hand's length, and what was changed by a fit."""
-    words = f"<b>{1000 * placed.hand.length:.0f} mm</b> from wrist to middle fingertip."
+    words = (
+        f"<b>{1000 * placed.hand.length:.0f} mm</b> from wrist to middle fingertip. <i>Fit shape</i> tracks "
+        "up to 48 frames from the one shown on, and fits these factors to their depth."
+    )
     if before is not None:
         rows = [("Length, mm", 1000 * before.hand.length, 1000 * placed.hand.length, "0f")]
         rows += [
