@@ -23,6 +23,7 @@ from spf.lens import seen_through
 from spf.posing import Explained, calibrated_from, explained, first_stance, fitted_from, open_hand
 from spf.prepare import SessionFrames
 from spf.sessions import Session
+from spf.sessions.marked import path_of
 
 __all__ = ["SHAPE_PARTS", "Placed", "Posing", "hand_of", "part_of", "pixels_of"]
 
@@ -109,9 +110,12 @@ class Posing(param.Parameterized):
         self._held: tuple[Session, int, Frame] | None = None
         self.state.param.watch(self._forget, "session")
 
-    def _forget(self, *_events: object) -> None:
+    def _forget(self, event: param.parameterized.Event) -> None:
+        self._held = None
+        if event.old is not None and event.new is not None and path_of(event.old) == path_of(event.new):
+            return  # the same recording, with other marks
         self._undo.clear()
-        self._begun, self._held = None, None
+        self._begun = None
         self.param.update(placed=None, compared=None, explained=None, told="")
 
     def frame(self) -> Frame:

@@ -43,7 +43,7 @@ class PoseTab(Follower):
             sizing_mode="stretch_both", margin=0,
         )  # fmt: skip
         self._controls, self._shape = PoseControls(posing), ShapeControls(posing)
-        keys = ("■", f"rgb{IN_FRONT}", "in front of the surface seen"), ("■", f"rgb{BEHIND}", "behind it")
+        keys = ("■", f"rgb{IN_FRONT}", "in front"), ("■", f"rgb{BEHIND}", "behind the surface")
         picture = pmu.Column(
             self.sheet, pn.pane.HTML(noted(_NOTE), margin=(2, 4, 0, 4), sizing_mode="stretch_width"), sizing_mode="stretch_both",
             margin=0,

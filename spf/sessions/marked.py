@@ -3,20 +3,40 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.frame import JOINT_NAMES, Truth
+from spf.frame import Truth
 from spf.sessions.choice import split_uri
-from spf.sessions.marks import Marks, count_marks, joints_of_marks, marks_file, marks_from_json, read_marks, write_marks
+from spf.sessions.marks import (
+    Mark,
+    Marks,
+    count_marks,
+    joints_of_marks,
+    marks_file,
+    marks_from_json,
+    read_marks,
+    write_marks,
+)
 from spf.sessions.mcap import McapSession
+from spf.sessions.mcap_index import index_file
 from spf.sessions.mcap_messages import MARKS_RECORD
 from spf.sessions.session import Session
 
-__all__ = ["BY_HAND", "MarkedSession", "keep_marks", "marks_in", "path_of", "with_marks", "with_own_marks"]
+__all__ = [
+    "BY_HAND",
+    "MarkedSession",
+    "keep_frame",
+    "keep_marks",
+    "marks_in",
+    "path_of",
+    "with_marks",
+    "with_own_marks",
+]
 
 #: The joint definition of a session that has no other truth than marks.
 BY_HAND = "marks"
@@ -97,19 +117,22 @@ def with_own_marks(session: Session) -> Session:
     Raises:
         SessionError: the marks are torn, or of another recording.
     """
+    inside = session.index.metadata.get(MARKS_RECORD) if isinstance(session, McapSession) else None
+    return with_marks(session, _kept(session, inside))
+
+
+def _kept(session: Session, inside: dict[str, str] | None) -> Marks:
     size = session.camera.width, session.camera.height
     beside = marks_file(path_of(session))
     if beside.is_file():
-        return with_marks(session, read_marks(beside, len(session), size))
-    inside = session.index.metadata.get(MARKS_RECORD) if isinstance(session, McapSession) else None
+        return read_marks(beside, len(session), size)
     if inside is None:
-        return session
-    source = f"The marks within {session.uri}"
-    return with_marks(session, marks_from_json(inside["marks"], len(session), size, source))
+        return {}
+    return marks_from_json(inside["marks"], len(session), size, f"The marks within {session.uri}")
 
 
 def keep_marks(session: Session, marks: Marks) -> Session:
-    """Keep marks beside a session, and return the session with them.
+    """Keep marks beside a session, in place of all that it had, and return the session with them.
 
     Raises:
         SessionError: the file beside it cannot be written.
@@ -119,10 +142,13 @@ def keep_marks(session: Session, marks: Marks) -> Session:
     return with_marks(session, marks)
 
 
-def joints_marked(session: Session) -> dict[str, int]:
-    """Return joint → number of frames that it is marked in, of joints that are."""
-    counts = {
-        name: sum(joints[name].point is not None for joints in marks_in(session).values() if name in joints)
-        for name in JOINT_NAMES
-    }
-    return {name: count for name, count in counts.items() if count}
+def keep_frame(session: Session, index: int, joints: Mapping[str, Mark]) -> Session:
+    """Keep the marks of one frame beside a session, and return the session with all that is kept by now, whoever marked it.
+
+    Raises:
+        SessionError: what is kept cannot be read, or the file beside it not be written.
+    """
+    inner = session.inner if isinstance(session, MarkedSession) else session
+    inside = index_file(inner.path).metadata.get(MARKS_RECORD) if isinstance(inner, McapSession) else None
+    others = {frame: marks for frame, marks in _kept(inner, inside).items() if frame != index}
+    return keep_marks(inner, dict(sorted({**others, index: joints}.items())) if joints else others)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from app.posing import SHAPE_PARTS, Posing, part_of, pixels_of
+from app.server import bundled
 from app.views.overlay import overlay_of, picture_of
 from spf.cli import execute
 from spf.hand import read_hand_shape, read_pose
@@ -146,7 +147,7 @@ def test_the_tracked_estimate_is_taken(posing, act):
 
 def test_another_session_begins_without_a_hand(posing, act):
     drag(posing, "palm", 5, 5)
-    posing.state.param.trigger("session")
+    act(lambda: posing._controller.open(bundled()["fast-wave"]))
     assert posing.placed is None
     assert not posing.can_undo
 

@@ -79,7 +79,8 @@ export function render({ model }) {
     const now = model.size.join();
     if (now !== size) { size = now; box = whole(); }
     if (!model.size[0]) return;
-    const per = scale() || 1;
+    const per = scale();
+    if (!Number.isFinite(per)) return;  // it is not seen now
     svg.setAttribute('viewBox', box.join(' '));
     root.classList.toggle('places', model.places);
     root.setAttribute('aria-label', model.alt);
