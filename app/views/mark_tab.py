@@ -13,7 +13,7 @@ from app.marking import Marking
 from app.views.follower import Follower
 from app.views.grid import card
 from app.views.mark_controls import MarkControls
-from app.views.overlay import lines_of, picture_of
+from app.views.overlay import focus_of, lines_of, picture_of
 from app.views.plots import heading
 from app.views.pose_tab import noted
 from app.views.sheet import Sheet
@@ -75,6 +75,8 @@ class MarkTab(Follower):
         if self._shown != (state.session.uri, state.frame):
             try:
                 camera = state.session.camera
+                if self._shown is None or self._shown[0] != state.session.uri:
+                    self.sheet.focus = focus_of(state.session, state.frame)
                 self.sheet.param.update(
                     image=picture_of(state.session, state.frame), size=[camera.width, camera.height], hint=""
                 )

@@ -19,7 +19,7 @@ from spf.render import depth_picture
 from spf.segmentation import find_regions
 from spf.sessions import Session
 
-__all__ = ["BEHIND", "BONES", "IN_FRONT", "Overlay", "lines_of", "overlay_of", "picture_of"]
+__all__ = ["BEHIND", "BONES", "IN_FRONT", "Overlay", "focus_of", "lines_of", "overlay_of", "picture_of"]
 
 #: Joints that are joined by a line, wrist first.
 BONES = tuple((0 if joint % 4 == 1 else joint - 1, joint) for joint in range(1, 21))
@@ -29,6 +29,7 @@ IN_FRONT, BEHIND = (255, 92, 168), (64, 208, 255)
 
 _CLOSE = 0.010  # m within which the model lies on the surface
 _WIDTH = 736  # pixels of the picture at least
+_ROOM = 0.12  # around the hand, as a share of what it takes
 _FAR = 1e8  # depth from which a rasterised pixel shows nothing
 
 
@@ -59,6 +60,22 @@ def picture_of(session: Session, index: int) -> bytes:
     if not done:
         raise SessionError(f"Frame {index} of {session.name} is too large to be shown.")
     return bytes(encoded)
+
+
+def focus_of(session: Session, index: int) -> list[float]:
+    """Return left, top, width and height, pixels, of the part of a frame in which the hand may be; [] where none is seen.
+
+    Raises:
+        SessionError: the frame cannot be read.
+    """
+    frame = session[index]
+    regions = find_regions(frame, most=1)
+    if not regions:
+        return []
+    pixels = frame.camera.project(regions[0].points)
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    margin = _ROOM * float((high - low).max())
+    return [*(low - margin).tolist(), *(high - low + 2 * margin).tolist()]
 
 
 def overlay_of(hand: Hand, stance: Stance, frame: Frame) -> Overlay:

@@ -11,7 +11,7 @@ import panel_material_ui as pmu
 from app.posing import Posing, pixels_of
 from app.views.follower import Follower
 from app.views.grid import card
-from app.views.overlay import BEHIND, IN_FRONT, overlay_of, picture_of
+from app.views.overlay import BEHIND, IN_FRONT, focus_of, overlay_of, picture_of
 from app.views.plots import CALM, heading
 from app.views.pose_controls import PoseControls
 from app.views.shape_controls import ShapeControls
@@ -37,7 +37,7 @@ class PoseTab(Follower):
     def __init__(self, posing: Posing) -> None:
         super().__init__(posing.state, also=("session", "task"))
         self._posing = posing
-        self._shown: tuple[Any, int] | None = None  # session and frame of the picture
+        self._shown: tuple[str, int] | None = None  # recording and frame of the picture
         self.sheet = Sheet(
             self._wish, alt="The hand over the depth image", hint="Choose a session to pose a hand in it.",
             sizing_mode="stretch_both", margin=0,
@@ -63,16 +63,18 @@ class PoseTab(Follower):
             return
         if posing.placed is None:
             asyncio.get_running_loop().create_task(posing.begin())
-        if self._shown != (state.session, state.frame):
+        if self._shown != (state.session.uri, state.frame):
             try:
                 camera = state.session.camera
+                if self._shown is None or self._shown[0] != state.session.uri:
+                    self.sheet.focus = focus_of(state.session, state.frame)
                 self.sheet.param.update(
                     image=picture_of(state.session, state.frame), size=[camera.width, camera.height], hint=""
                 )
             except SessionError as error:
                 state.error = str(error)
                 return
-            self._shown = state.session, state.frame
+            self._shown = state.session.uri, state.frame
             posing.judge()
         self._redraw()
 

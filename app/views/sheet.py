@@ -24,6 +24,7 @@ class Sheet(JSComponent):
 
     image: bytes = param.Bytes(b"", doc="a JPEG or PNG file of the whole depth image, or nothing")
     size: list[int] = param.List(default=[0, 0], doc="width and height of the depth image, pixels")
+    focus: list[float] = param.List(default=[], doc="left, top, width and height that are seen at first; [] for all")
     tint: bytes = param.Bytes(b"", doc="a PNG file that is laid over a part of it, or nothing")
     tint_box: list[float] = param.List(default=[], doc="left, top, width and height of that part")
     lines: list[dict[str, Any]] = param.List(default=[], doc="points [[u, v], …] and kind of each")

@@ -77,7 +77,7 @@ export function render({ model }) {
   const draw = () => {
     scheduled = false;
     const now = model.size.join();
-    if (now !== size) { size = now; box = whole(); }
+    if (now !== size) { size = now; box = model.focus.length ? [...model.focus] : whole(); }
     if (!model.size[0]) return;
     const per = scale();
     if (!Number.isFinite(per)) return;  // it is not seen now
@@ -181,6 +181,8 @@ export function render({ model }) {
   const coloured = () => show(tint, 'tint', model.tint, model.tint_box.length ? model.tint_box : whole());
   model.on('image', picture);
   model.on('tint', coloured);
+  const focus = () => { if (model.focus.length) box = [...model.focus]; soon(); };
+  model.on('focus', focus);
   model.on('echo', answered);
   for (const name of ['size', 'lines', 'handles', 'chosen', 'hint', 'alt', 'places']) model.on(name, soon);
   const watcher = new ResizeObserver(soon);
@@ -191,6 +193,7 @@ export function render({ model }) {
   });
   box = whole();
   size = model.size.join();
+  focus();
   picture();
   coloured();
   return root;
