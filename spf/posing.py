@@ -190,7 +190,8 @@ def calibrated_from(
         stance = turned_home(Stance(views[0].pose, views[0].reference))
     report("Fitting the hand's size", 0.9)
     shape, views, _ = size_by_render(views, shape, rng)
-    return shape, turned_home(Stance(views[0].pose, views[0].reference))
+    stance = turned_home(Stance(views[0].pose, views[0].reference))
+    return shape, fitted_from(frames[0], shape, stance, rng, lambda text, share: report(text, 0.95 + 0.05 * share))
 
 
 def _views(

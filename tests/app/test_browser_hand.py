@@ -36,7 +36,7 @@ def everywhere(page, name):  # noqa: F811
     """Pictures in the dark and on a small screen, where nothing is cut off."""
     page.get_by_label("Toggle theme").click()
     page.set_viewport_size({"width": 1024, "height": 768})
-    page.wait_for_timeout(2000)
+    page.wait_for_timeout(4000)  # the colours change slowly
     picture_of(page, f"{name}-dark-small")
     assert page.evaluate("document.documentElement.scrollWidth") <= 1024
     page.get_by_label("Toggle theme").click()
