@@ -4,86 +4,29 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import param
 
 from app.controller import Controller
+from app.placed import Placed, with_part
 from app.runner import Report
 from app.state import State
 from spf.errors import HandError, StartError
 from spf.frame import Frame
 from spf.hand import HandShape, SavedPose, read_pose, write_pose
-from spf.hand.handles import Stance, dragged, handle_points, turned_home
-from spf.hand.model import FINGERS, Hand, Side
+from spf.hand.handles import Stance, dragged, turned_home
+from spf.hand.model import Side
 from spf.lens import seen_through
 from spf.posing import Explained, calibrated_from, explained, first_stance, fitted_from, open_hand
 from spf.prepare import SessionFrames
 from spf.sessions import Session
 from spf.sessions.marked import path_of
 
-__all__ = ["SHAPE_PARTS", "Placed", "Posing", "hand_of", "part_of", "pixels_of"]
+__all__ = ["Posing"]
 
-_BONES_A_DIGIT = 3
 _MOST_UNDONE = 100
-
-#: What of a hand's shape a visitor sets, by the words of the page.
-SHAPE_PARTS = {
-    "Size": "scale",
-    **{f"{finger.capitalize()} length": finger for finger in FINGERS},
-    "Palm width": "palm_width", "Palm thickness": "palm_thickness", "Finger thickness": "finger_thickness",
-}  # fmt: skip
-
-
-class Placed(NamedTuple):
-    """A hand of some shape in some pose."""
-
-    shape: HandShape
-    stance: Stance
-
-    @property
-    def hand(self) -> Hand:
-        """The hand of that shape."""
-        return hand_of(self.shape)
-
-
-@lru_cache(maxsize=32)
-def hand_of(shape: HandShape) -> Hand:
-    """Return the hand of a shape; those made last are remembered."""
-    return shape.hand()
-
-
-def pixels_of(placed: Placed, frame: Frame) -> dict[str, tuple[float, float]]:
-    """Return the pixels of the handles of a hand."""
-    points = handle_points(placed.hand, placed.stance)
-    return {name: (float(u), float(v)) for name, (u, v) in ((n, frame.camera.project(p)) for n, p in points.items())}
-
-
-def part_of(shape: HandShape, part: str) -> float:
-    """Return a factor of :data:`SHAPE_PARTS`; that of a finger is the geometric mean over its bones."""
-    if part not in FINGERS:
-        return float(getattr(shape, part))
-    first = _BONES_A_DIGIT * FINGERS.index(part)
-    return float(np.exp(np.log(shape.lengths[first : first + _BONES_A_DIGIT]).mean()))
-
-
-def _with_part(shape: HandShape, part: str, value: float) -> HandShape:
-    """Return a shape with one factor of :data:`SHAPE_PARTS`.
-
-    Raises:
-        HandError: no human hand is like that.
-    """
-    if part in FINGERS:
-        lengths, first = list(shape.lengths), _BONES_A_DIGIT * FINGERS.index(part)
-        ratio = value / part_of(shape, part)
-        lengths[first : first + _BONES_A_DIGIT] = [ratio * own for own in lengths[first : first + _BONES_A_DIGIT]]
-        changed = shape._replace(lengths=tuple(lengths))
-    else:
-        changed = shape
-    return HandShape.from_dict({**changed.to_dict(), **({} if part in FINGERS else {part: float(value)})}, "The hand")
 
 
 class Posing(param.Parameterized):
@@ -256,7 +199,7 @@ class Posing(param.Parameterized):
         if self.placed is None:
             return
         try:
-            self._place(Placed(_with_part(self.placed.shape, part, value), self.placed.stance))
+            self._place(Placed(with_part(self.placed.shape, part, value), self.placed.stance))
         except HandError as error:
             self.state.error = str(error)
             self.param.trigger("placed")  # puts the widget back

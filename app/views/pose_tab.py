@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import panel as pn
 import panel_material_ui as pmu
 
-from app.posing import Posing, pixels_of
+from app.placed import pixels_of
+from app.posing import Posing
 from app.views.follower import Follower
 from app.views.grid import card
 from app.views.overlay import BEHIND, IN_FRONT, focus_of, overlay_of, picture_of

@@ -8,7 +8,8 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmu
 
-from app.posing import SHAPE_PARTS, Placed, Posing, part_of
+from app.placed import SHAPE_PARTS, Placed, part_of
+from app.posing import Posing
 from app.views.download import Download
 from spf.errors import SpfError
 

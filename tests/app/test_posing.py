@@ -6,7 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from app.posing import SHAPE_PARTS, Posing, part_of, pixels_of
+from app.placed import SHAPE_PARTS, part_of, pixels_of
+from app.posing import Posing
 from app.server import bundled
 from app.views.overlay import overlay_of, picture_of
 from spf.cli import execute
