@@ -12,6 +12,8 @@ import param
 from app.address import Address, follow_in, place_of
 from app.controller import Controller
 from app.keeper import Keeper
+from app.marking import Marking
+from app.posing import Posing
 from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
@@ -26,9 +28,11 @@ from app.views.fold import folded
 from app.views.landscape import LandscapeCard
 from app.views.lanes_card import LanesCard
 from app.views.live_card import LiveCard
+from app.views.mark_tab import MarkTab
 from app.views.messages import Messages
 from app.views.modes import Modes
 from app.views.names import Names
+from app.views.pose_tab import PoseTab
 from app.views.runs_card import RunsCard
 from app.views.session_card import SessionCard
 from app.views.settings_card import SettingsCard
@@ -66,6 +70,10 @@ def page() -> pmu.Page:
     shelf, presets = Shelf(), Presets()
     controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf))
     reruns, previewer = Reruns(controller, shelf), Previewer(state)
+    posing = Posing(controller, shelf.folder)
+    marking = Marking(controller)
+    modes.detail.offer("pose", lambda: PoseTab(posing))
+    modes.detail.offer("marks", lambda: MarkTab(marking))
     address = Address(state, controller, reruns, samples)
     session = SessionCard(state, controller.open, samples, uploads)
     lanes, settings = LanesCard(state, controller), SettingsCard(state, presets)

@@ -11,7 +11,10 @@ from spf.render import ViewCamera
 __all__ = ["COLOURINGS", "DENSITIES", "LAYERS", "TABS", "Look", "Shown"]
 
 #: Parts of the page of one tracker, by the words of the page.
-TABS = {"Overview": "overview", "What the filter thinks": "particles", "3-D scene": "scene"}
+TABS = {
+    "Overview": "overview", "What the filter thinks": "particles", "3-D scene": "scene", "Pose the hand": "pose",
+    "Mark joints": "marks",
+}  # fmt: skip
 
 #: Layers of the scene, by the words of the page.
 LAYERS = {

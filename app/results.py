@@ -134,6 +134,12 @@ class Results:
             oldest = next(iter(self._entries))
             del self._entries[oldest], self._sizes[oldest]
 
+    def remeasure(self, frame: Frame) -> None:
+        """Compare a tracked frame with its truth anew: somebody has marked joints in it."""
+        summary = self._summaries.get(frame.index)
+        if summary is not None:
+            self._summaries[frame.index] = summary._replace(error=joint_error(summary.joints, frame))
+
     def cut(self, index: int) -> None:
         """Drop a frame and all after it: they no longer follow from what comes before."""
         parts: tuple[dict[int, Any], ...] = (self._summaries, self._rows, self._states, self._entries, self._sizes)

@@ -11,6 +11,8 @@ import panel as pn
 from app.kernels import Kernels
 from spf.render import Renderer
 from spf.sessions import Session, open_session
+from spf.sessions.choice import split_uri
+from spf.sessions.marks import marks_file
 
 __all__ = ["SAMPLES", "bundled", "kernels", "open_shared", "renderer"]
 
@@ -41,13 +43,14 @@ def bundled() -> dict[str, str]:
 
 
 def open_shared(uri: str, camera: str | None) -> Session:
-    """Open a session once for all pages; a file that changed is opened again.
+    """Open a session once for all pages; a file that changed, or whose marks did, is opened again.
 
     Raises:
         SessionError: see :func:`spf.sessions.open_session`.
     """
     path = Path(uri).expanduser()
-    stamp = path.stat().st_mtime_ns if path.exists() else 0
+    files = path, marks_file(split_uri(path)[0])
+    stamp = [file.stat().st_mtime_ns for file in files if file.exists()]
     session: Session = pn.state.as_cached(
         f"session {path.absolute()} {camera} {stamp}", lambda: open_session(path, camera), ttl=_KEPT
     )

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Protocol
 
 import panel as pn
 import panel_material_ui as pmu
@@ -28,18 +29,33 @@ __all__ = ["Detail", "Overview", "truth_switch"]
 _PICTURE_HEIGHT, _PLOT_HEIGHT = 268, 196
 
 
+class Tab(Protocol):
+    """A part of the page of one tracker; one without 3-D pictures has None."""
+
+    panel: Any
+
+    @property
+    def pictures(self) -> ThreeD | None:
+        """The 3-D pictures."""
+
+
 class Detail:
     """The part of the page that is seen in the mode of one tracker: tabs, each made when it is first asked for."""
 
     def __init__(self, state: State, renderer: Renderer) -> None:
-        self._state, self._renderer = state, renderer
-        self._tabs: dict[str, Overview | Thinking | SceneTab] = {"overview": Overview(state, renderer)}
+        self._state = state
+        self._overview = Overview(state, renderer)
+        self._tabs: dict[str, Tab] = {"overview": self._overview}
+        self._makers: dict[str, Callable[[], Tab]] = {
+            "particles": lambda: Thinking(state, renderer), "scene": lambda: SceneTab(state, renderer),
+        }  # fmt: skip
         switch = pmu.RadioButtonGroup.from_param(
             state.look.param.tab, name="", options=TABS, size="small", margin=(0, 8),
             sx={"& .MuiToggleButton-root": {"textTransform": "none", "padding": "3px 14px", "whiteSpace": "nowrap"}},
         )  # fmt: skip
+        self._views = viewpoints(state)
         head = pn.FlexBox(
-            switch, viewpoints(state), justify_content="space-between", align_items="center", sizing_mode="stretch_width",
+            switch, self._views, justify_content="space-between", align_items="center", sizing_mode="stretch_width",
             margin=(0, 8, 4, 0),
         )  # fmt: skip
         self.panel = pn.Column(head, self._tabs["overview"].panel, sizing_mode="stretch_width", margin=0)
@@ -47,17 +63,21 @@ class Detail:
 
     @property
     def pictures(self) -> ThreeD:
-        """The pictures of the tab that is seen."""
-        return self._tabs[self._state.look.tab].pictures
+        """The pictures of the tab that is seen; the first tab's where it has none."""
+        return self._tabs[self._state.look.tab].pictures or self._overview.pictures
+
+    def offer(self, tab: str, make: Callable[[], Tab]) -> None:
+        """Say how a tab is made when it is first asked for."""
+        self._makers[tab] = make
 
     def _follow(self, *_events: Any) -> None:
         tab = self._state.look.tab
         if tab not in self._tabs:
-            made = Thinking if tab == "particles" else SceneTab
-            self._tabs[tab] = made(self._state, self._renderer)
+            self._tabs[tab] = self._makers[tab]()
             self.panel.append(self._tabs[tab].panel)
         for name, part in self._tabs.items():
             part.panel.visible = name == tab
+        self._views.visible = self._tabs[tab].pictures is not None
         self.pictures.request()
 
 

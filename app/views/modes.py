@@ -36,8 +36,9 @@ class Modes:
 
     def __init__(self, state: State, renderer: Renderer) -> None:
         self._state, self._renderer = state, renderer
-        self._parts: dict[str, Detail | Comparison | Help] = {"one": Detail(state, renderer)}
-        self.panel = pn.Column(self._parts["one"].panel, sizing_mode="stretch_width", margin=0)
+        self.detail = Detail(state, renderer)
+        self._parts: dict[str, Detail | Comparison | Help] = {"one": self.detail}
+        self.panel = pn.Column(self.detail.panel, sizing_mode="stretch_width", margin=0)
         state.param.watch(self._follow, "mode")
 
     def switch(self, show: Callable[[str], Awaitable[None]]) -> pmu.RadioButtonGroup:

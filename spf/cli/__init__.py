@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import typer
 
-from spf.cli import comparing, live, results, sessions, sharing, tracking
+from spf.cli import comparing, live, marking, results, sessions, sharing, tracking
 from spf.cli.console import INTERRUPTED, complain, show_version
 from spf.errors import SpfError
 
@@ -28,7 +28,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 _COMMANDS = (
-    *sessions.COMMANDS, *tracking.COMMANDS, *live.COMMANDS, *results.COMMANDS, *sharing.COMMANDS,
+    *sessions.COMMANDS, *tracking.COMMANDS, *live.COMMANDS, *marking.COMMANDS, *results.COMMANDS, *sharing.COMMANDS,
 )  # fmt: skip
 for command in _COMMANDS:
     app.command()(command)

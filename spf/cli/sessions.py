@@ -77,6 +77,7 @@ def _facts(session: Session) -> dict[str, Any]:
         "hand_sized_surface": f"in {seen} of the {len(frames)} frames looked at",
         "side": session.side,
         "truth": session.joint_definition if session.has_truth else None,
+        "marked_by_hand": session.metadata.get("marks"),
         "exact_hand_shape": session.hand_shape is not None,
         "sensor": session.metadata.get("sensor"),
         "contents": list(session.contents),

@@ -17,7 +17,9 @@ from spf.hand.kinematics import pose_hand
 from spf.joint_definitions import corrected_joints, offsets_of
 from spf.lens import as_stated, seen_through
 from spf.runs import Run
-from spf.sessions import Session
+from spf.sessions import Session, marks_in
+from spf.sessions.marked import BY_HAND
+from spf.sessions.marks import count_marks
 from spf.trackfile import Track
 
 __all__ = ["Compared", "compare_run", "evaluate_run", "measures_of"]
@@ -78,6 +80,7 @@ def measures_of(run: Run, session: Session, compared: Compared) -> dict[str, Any
         raw = measure_joints(joint_errors(track.joints, compared.truth))
         corrected = measure_joints(compared.errors)
         report |= _joints_part(raw, corrected) | {"correction": _correction_note(session, offsets)}
+        report |= _marks_part(session, compared)
     return _plain(report | _depth_part(compared) | _losses_part(track) | _work_part(track))
 
 
@@ -131,7 +134,18 @@ def _joints_part(raw: JointMeasures, corrected: JointMeasures) -> dict[str, Any]
     }
 
 
+def _marks_part(session: Session, compared: Compared) -> dict[str, Any]:
+    """How much of the truth a person has marked, in the whole session; nothing where nobody has."""
+    frames, joints = count_marks(marks_in(session))
+    known = int(np.isfinite(compared.errors).sum())
+    return (
+        {"frames_marked_by_hand": frames, "joints_marked_by_hand": joints, "joints_compared": known} if frames else {}
+    )
+
+
 def _correction_note(session: Session, offsets: Array | None) -> str:
+    if session.joint_definition == BY_HAND:
+        return "none: joints marked by hand are taken as they are"
     if offsets is None:
         return f"none fitted for the joints of {session.joint_definition}: mean_joint_error_mm is the raw error"
     if not offsets.any():

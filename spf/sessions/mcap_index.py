@@ -21,10 +21,10 @@ from zstandard import ZstdError
 
 from spf.errors import SessionError
 
-__all__ = ["McapIndex", "Place", "has_magic", "index_file", "read_message"]
+__all__ = ["DAMAGE", "McapIndex", "Place", "has_magic", "index_file", "read_message", "records_in"]
 
 #: What the MCAP library and the decompressor raise on damaged bytes.
-_DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError)
+DAMAGE = (McapError, ZstdError, struct.error, ValueError, KeyError, OverflowError)
 
 _RECORD = struct.Struct("<BQ")
 _FOOTER = struct.Struct("<BQQQI")
@@ -71,7 +71,7 @@ def index_file(path: Path) -> McapIndex:
     with path.open("rb") as file:
         try:
             return _from_summary(file) or _from_walk(file)
-        except _DAMAGE:
+        except DAMAGE:
             return _from_walk(file)
 
 
@@ -84,18 +84,18 @@ def read_message(path: Path, index: McapIndex, topic: str, time: int) -> bytes:
     offset, channel = index.places[topic][time]
     try:
         with path.open("rb") as file:
-            opcode, _, content = next(_records(file, offset))
+            opcode, _, content = next(records_in(file, offset))
         if opcode != Opcode.CHUNK:
             raise ValueError(opcode)
         _, messages = _open_chunk(content)
         return next(message.data for message in messages if (message.log_time, message.channel_id) == (time, channel))
-    except (*_DAMAGE, StopIteration, OSError) as error:
+    except (*DAMAGE, StopIteration, OSError) as error:
         raise SessionError(
             f"{path} is damaged or was changed while it was open (at byte {offset}): open it again, or record it again."
         ) from error
 
 
-def _records(file: BinaryIO, offset: int) -> Iterator[tuple[int, int, bytes]]:
+def records_in(file: BinaryIO, offset: int) -> Iterator[tuple[int, int, bytes]]:
     """Yield (opcode, offset, content) of all complete records from an offset on."""
     size = file.seek(0, 2)
     while offset + _RECORD.size <= size:
@@ -111,7 +111,7 @@ def _records(file: BinaryIO, offset: int) -> Iterator[tuple[int, int, bytes]]:
 
 def _record_at(file: BinaryIO, offset: int) -> bytes:
     """Return the content of the record at an offset; an index may name one behind the end."""
-    record = next(_records(file, offset), None)
+    record = next(records_in(file, offset), None)
     if record is None:
         raise ValueError(offset)
     return record[2]
@@ -135,7 +135,7 @@ def _from_summary(file: BinaryIO) -> McapIndex | None:
     opcode, _, summary_start, _, _ = _FOOTER.unpack(file.read(_FOOTER.size))
     if file.read() != MCAP0_MAGIC or opcode != Opcode.FOOTER or summary_start == 0:
         return None
-    records = [(opcode, content) for opcode, _, content in _records(file, summary_start)]
+    records = [(opcode, content) for opcode, _, content in records_in(file, summary_start)]
     channels = [Channel.read(_stream(content)) for opcode, content in records if opcode == Opcode.CHANNEL]
     places: dict[str, dict[int, Place]] = {channel.topic: {} for channel in channels}
     topics = {channel.id: channel.topic for channel in channels}
@@ -166,13 +166,13 @@ def _from_walk(file: BinaryIO) -> McapIndex:
     begin: int | None = len(MCAP0_MAGIC)
     while begin is not None:
         offset = begin
-        for opcode, start, content in _records(file, begin):
+        for opcode, start, content in records_in(file, begin):
             offset = start
             if opcode == Opcode.FOOTER:
                 return index._replace(whole=file.read() == MCAP0_MAGIC and not index.damaged)
             try:
                 _take(index, topics, opcode, start, content)
-            except _DAMAGE:
+            except DAMAGE:
                 break
             offset = start + _RECORD.size + len(content)
         begin = _next_chunk(file, offset + 1)

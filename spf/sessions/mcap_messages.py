@@ -25,6 +25,7 @@ __all__ = [
     "DEPTH_TOPIC",
     "FREE_RECORD",
     "JOINTS_TOPIC",
+    "MARKS_RECORD",
     "MESSAGE_TYPES",
     "NOTES_TOPIC",
     "ORIENTATION_TOPIC",
@@ -70,9 +71,10 @@ MESSAGE_TYPES = {
     NOTES_TOPIC: _LOG,
 }
 
-#: The metadata records: what the format defines, and whatever else the writer was told.
+#: The metadata records: what the format defines, whatever else the writer was told, joints that a person marked.
 SESSION_RECORD = "spf.session"
 FREE_RECORD = "spf.metadata"
+MARKS_RECORD = "spf.marks"
 
 _FORMAT_VERSION = 1
 _FRAME_ID = "depth_optical_frame"

@@ -15,6 +15,7 @@ from spf.sessions.choice import choice_of, split_uri
 from spf.sessions.cvar import is_cvar, open_cvar
 from spf.sessions.files import natural_key
 from spf.sessions.icvl import is_icvl, open_icvl
+from spf.sessions.marked import with_own_marks
 from spf.sessions.mcap import is_mcap, open_mcap
 from spf.sessions.msra15 import is_msra15, open_msra15
 from spf.sessions.nyu import is_nyu, open_nyu
@@ -91,7 +92,8 @@ def open_session(uri: str | Path, camera: Camera | str | Path | None = None) -> 
         camera: the camera, or a camera file, of a recording that has none of its own, or a wrong one.
 
     Returns:
-        the session; :attr:`Session.warnings` says what a user should know of how it was read.
+        the session, with the joints that a person has marked in it (:mod:`spf.sessions.marked`) as its truth;
+        :attr:`Session.warnings` says what a user should know of how it was read.
 
     Raises:
         SessionError: there is nothing there, no format fits, something is left to choose, or what is there is damaged.
@@ -112,8 +114,8 @@ def open_session(uri: str | Path, camera: Camera | str | Path | None = None) -> 
         if left:
             raise SessionError(f"{path} ({found.name}) leaves no {left[0]} to choose: leave out what follows the ?.")
         if not found.chosen:
-            return found.open(path)
-        return found.open(path, choice_of(str(uri), options, camera), str(uri))
+            return with_own_marks(found.open(path))
+        return with_own_marks(found.open(path, choice_of(str(uri), options, camera), str(uri)))
     except OSError as error:
         raise SessionError(f"{path} cannot be read: {error.strerror or error}.") from error
 
