@@ -21,7 +21,7 @@ from spf.render.palette import PREDICTED
 __all__ = ["Depth", "depth_jpeg"]
 
 Colour = tuple[int, ...]  # RGB, 0 to 255
-_WIDTH = 736  # pixels, twice what it takes in the page
+_WIDTH, _QUICK_WIDTH = 736, 368  # pixels: twice what it takes in the page, and once while playing
 _ESTIMATE = (255, 255, 255)  # RGB
 _TRUTH = tuple(round(255 * part) for part in PREDICTED)
 
@@ -36,7 +36,7 @@ class Depth:
         self.pane = Picture(
             hint="Choose a session to see its depth images.", alt="Depth image", sizing_mode="stretch_both", margin=0
         )
-        state.param.watch(self.draw, ["session", "revision", "with_truth"])
+        state.param.watch(self.draw, ["session", "revision", "with_truth", "playing"])
         state.look.param.watch(self.draw, "tab")
 
     def draw(self, *_events: Any) -> None:
@@ -61,6 +61,7 @@ class Depth:
         state = self._state
         session, index, with_truth = state.session, state.frame, state.with_truth
         assert session is not None
+        width = _QUICK_WIDTH if state.playing else _WIDTH
         seen = state.entry.seen if state.entry is not None else None
         shown = [(lane.colour, lane.summary(index)) for lane in state.active]
         estimates = [
@@ -72,20 +73,23 @@ class Depth:
         def work() -> bytes:
             frame = session[index]
             truth = [Skeleton(frame.truth.joints, _TRUTH)] if with_truth and frame.truth is not None else []
-            return depth_jpeg(frame, seen, [*truth, *estimates])
+            return depth_jpeg(frame, seen, [*truth, *estimates], width)
 
         return work
 
 
-def depth_jpeg(frame: Frame, seen: Seen | None = None, skeletons: Sequence[Skeleton] = ()) -> bytes:
+def depth_jpeg(
+    frame: Frame, seen: Seen | None = None, skeletons: Sequence[Skeleton] = (), width: int = _WIDTH
+) -> bytes:
     """Return a JPEG file of a frame.
 
     Args:
         frame: the depth image.
         seen: what the tracker took for the hand: in colour, all else in grey; None colours everything.
         skeletons: the later over the earlier.
+        width: of the picture, pixels.
     """
-    picture = depth_picture(frame, None if seen is None else _region(frame, seen), skeletons, width=_WIDTH)
+    picture = depth_picture(frame, None if seen is None else _region(frame, seen), skeletons, width=width)
     _, encoded = cv2.imencode(".jpg", picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 90])
     return bytes(encoded)
 

@@ -12,7 +12,7 @@ from app.state import State
 
 __all__ = ["Follower"]
 
-_EVERY = 0.6  # s between two redraws while playing
+_EVERY = 1.0  # s between two redraws while playing
 _PICTURES_FIRST = 400  # ms that the plots wait at most for the pictures of a frame, which are looked at first
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.results import Entry
 from app.state import State
 from spf.filters.step import StepInfo
-from spf.hand.kinematics import joints_of, pose_hand
+from spf.hand.kinematics import joints_of, joints_of_each, pose_hand
 from spf.render import Colour, Scene, ViewCamera, particles_scene, reconstruction_scene, trajectories_scene
 from spf.render.palette import HAND
 
@@ -91,8 +91,7 @@ def trajectories_of(entry: Entry, selected: tuple[int, ...] = ()) -> Scene | Non
     paths = np.empty((len(traces), _PATH_POSES, len(_PATH_JOINTS), 3))
     for path, trace in zip(paths, traces, strict=True):
         at = np.linspace(0, len(trace.poses) - 1, _PATH_POSES).round().astype(np.intp)
-        for place, pose in zip(path, trace.poses[at].astype(np.float64), strict=True):
-            place[:] = joints_of(hand, pose, info.reference)[_PATH_JOINTS]
+        path[:] = joints_of_each(hand, trace.poses[at], info.reference)[:, _PATH_JOINTS]
     return trajectories_scene(paths, weights=after[drawn], points=seen.points)
 
 

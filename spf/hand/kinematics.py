@@ -89,11 +89,12 @@ def joints_of(hand: Hand, pose: ArrayLike, reference: ArrayLike | None = None) -
     return _place_joints(hand, _frames(chain, p))
 
 
-def joints_of_each(hand: Hand, poses: Array) -> Array:
-    """Return the joints (N, 21, 3), m, of poses (N, D) relative to the camera's axes."""
-    joints = np.empty((len(poses), len(hand.joint_bone), 3))
+def joints_of_each(hand: Hand, poses: ArrayLike, reference: ArrayLike | None = None) -> Array:
+    """Return the joints (N, 21, 3), m, of poses (N, D); see :func:`pose_hand` for ``reference``."""
     p = np.ascontiguousarray(poses, dtype=np.float64)
-    joints_of_poses(hand.skeleton, hand.joint_bone, hand.joint_offset, p, np.eye(3), joints)
+    axes = np.eye(3) if reference is None else np.ascontiguousarray(reference, dtype=np.float64)
+    joints = np.empty((len(p), len(hand.joint_bone), 3))
+    joints_of_poses(hand.skeleton, hand.joint_bone, hand.joint_offset, p, axes, joints)
     return joints
 
 

@@ -59,9 +59,12 @@ def depth_picture(
         width: of the picture, in pixels; its height follows.
     """
     part = box or Box(0, 0, frame.depth.shape[1], frame.depth.shape[0])
-    rows, columns = slice(part.top, part.top + part.height), slice(part.left, part.left + part.width)
-    rgb = _coloured(frame.depth, region)[rows, columns]
     scale = width / part.width
+    every = max(1, round(1 / scale))  # pixels that the picture has no room for need no colour
+    rows, columns = (
+        slice(first, first + length, every) for first, length in ((part.top, part.height), (part.left, part.width))
+    )
+    rgb = _coloured(frame.depth[rows, columns], None if region is None else region[rows, columns])
     canvas = np.asarray(
         cv2.resize(rgb, (width, round(part.height * scale)), interpolation=cv2.INTER_NEAREST), dtype=np.uint8
     )

@@ -126,7 +126,10 @@ def test_mirrored_poses_mirror(seed: int) -> None:
 def test_the_joints_of_many_poses_are_those_of_each(rng):
     hand = load_hand("left").scaled(1.2)
     poses = rng.normal(scale=0.4, size=(5, 26))
-    np.testing.assert_allclose(joints_of_each(hand, poses), [joints_of(hand, pose) for pose in poses], atol=1e-12)
+    turned = rotation_about((0.4, -0.2, 1.1))
+    for axes in (None, turned):
+        one_by_one = [joints_of(hand, pose, axes) for pose in poses]
+        np.testing.assert_allclose(joints_of_each(hand, poses, axes), one_by_one, atol=1e-12)
 
 
 def test_the_left_mesh_is_nearly_the_right_one_mirrored() -> None:
