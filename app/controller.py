@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from app.lane import Lane, Origin
 from app.navigation import Navigation
@@ -42,8 +41,8 @@ class Controller(Navigation):
         """Return the work of Start, with everything that was chosen until now."""
         state, kernels = self.state, self.kernels
         session, seed = state.session, state.seed
-        init = _chosen_file(state.pose_file, "pose") if state.init == "file" else state.init
-        hand_file = _chosen_file(state.hand_file, "hand") if state.shape == "file" else None
+        init = self._chosen_file(state.pose_file, "pose") if state.init == "file" else state.init
+        hand_file = self._chosen_file(state.hand_file, "hand") if state.shape == "file" else None
         if session is None:
             raise StartError("Choose a session first.")
 
@@ -54,6 +53,14 @@ class Controller(Navigation):
             return Origin(start, float(session.times[start.frame]), seed)
 
         return work
+
+    def _chosen_file(self, path: str, what: str) -> str:
+        if not path.strip():
+            raise HandError(f"Type the path of a {what} file first.")
+        chosen = self.allowed(path.strip())
+        if not chosen.is_file():
+            raise HandError(f"There is no {what} file {path.strip()}: check its path.")
+        return str(chosen)
 
     async def restart(self) -> None:
         """Go back to the first frame of the run and track it anew with the present settings."""
@@ -95,11 +102,3 @@ class Controller(Navigation):
         self.cancel()
         first = state.origin.start.frame if state.last is None else state.last + 1
         await self.reach(range(first, state.frame + 1))
-
-
-def _chosen_file(path: str, what: str) -> str:
-    if not path.strip():
-        raise HandError(f"Type the path of a {what} file first.")
-    if not Path(path.strip()).is_file():
-        raise HandError(f"There is no {what} file {path.strip()}: check its path.")
-    return path.strip()

@@ -11,12 +11,13 @@ import param
 
 from app.address import Address, follow_in, place_of
 from app.controller import Controller
+from app.folders import SAMPLES, allowed
 from app.keeper import Keeper
 from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
 from app.runner import Runner
-from app.server import SAMPLES, bundled, kernels, open_shared, renderer
+from app.server import bundled, kernels, open_shared, renderer
 from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
@@ -64,7 +65,7 @@ def page() -> pmu.Page:
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
     shelf, presets = Shelf(), Presets()
-    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf))
+    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf), allowed)
     reruns, previewer = Reruns(controller, shelf), Previewer(state)
     address = Address(state, controller, reruns, samples)
     session = SessionCard(state, controller.open, samples, uploads)

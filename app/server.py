@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import atexit
 from functools import lru_cache
-from pathlib import Path
 
 import panel as pn
 
+from app.folders import SAMPLES, allowed_session
 from app.kernels import Kernels
 from spf.render import Renderer
 from spf.sessions import Session, open_session
+from spf.sessions.choice import split_uri
 
 __all__ = ["SAMPLES", "bundled", "kernels", "open_shared", "renderer"]
 
-#: Where the sample sessions are, and where new captures land.
-SAMPLES = Path(__file__).resolve().parent.parent / "sessions"
 _KEPT = 3600  # s that an opened session is kept for the next who asks
 
 
@@ -44,11 +43,13 @@ def open_shared(uri: str, camera: str | None) -> Session:
     """Open a session once for all pages; a file that changed is opened again.
 
     Raises:
+        OutsideError: it is in none of the folders that a page may open.
         SessionError: see :func:`spf.sessions.open_session`.
     """
-    path = Path(uri).expanduser()
+    uri, camera = allowed_session(uri, camera)
+    path, _ = split_uri(uri)
     stamp = path.stat().st_mtime_ns if path.exists() else 0
     session: Session = pn.state.as_cached(
-        f"session {path.absolute()} {camera} {stamp}", lambda: open_session(path, camera), ttl=_KEPT
+        f"session {uri} {camera} {stamp}", lambda: open_session(uri, camera), ttl=_KEPT
     )
     return session

@@ -6,6 +6,7 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import TypeVar
 
 from app.clock import Clock
@@ -46,6 +47,7 @@ class Work:
         drawn: waits until the browser has shown the latest frame, so that playing never piles up frames.
         kernels: waits in the worker until the kernels are compiled, and reports meanwhile.
         keeper: keeps what was tracked on disk; without it nothing is kept.
+        allowed: returns the path of a file that a visitor has named, or raises an SpfError; without it all may be read.
     """
 
     def __init__(
@@ -56,9 +58,10 @@ class Work:
         drawn: Callable[[], Awaitable[None]] = _at_once,
         kernels: Wait = _ready,
         keeper: Keeper | None = None,
+        allowed: Callable[[str], Path] = Path,
     ) -> None:
         self.state, self._runner, self.opener, self.drawn, self.kernels = state, runner, open_, drawn, kernels
-        self.keeper = keeper or Keeper(state, None)
+        self.keeper, self.allowed = keeper or Keeper(state, None), allowed
         self._turn = 0  # counts what was cancelled, so that an action knows when it no longer is the one that runs
         self._advancing = asyncio.Lock()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import html
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -10,15 +11,15 @@ import panel as pn
 import panel_material_ui as pmu
 
 from app.state import State
-from app.uploads import LARGEST_UPLOAD, Uploads
+from app.uploads import Uploads
 from app.views.fold import folded
+from app.views.upload import Upload
 from spf.errors import SessionError
 from spf.sessions import Session
 
 __all__ = ["SessionCard", "described"]
 
 Open = Callable[[str, str], Awaitable[None]]
-_CHUNK = 4 * 2**20  # bytes of an upload in one message
 
 
 class SessionCard:
@@ -40,10 +41,7 @@ class SessionCard:
             description="For a folder of images that has no camera.json of its own.",
         )  # fmt: skip
         go = pmu.Button(label="Open", icon="folder_open", size="small", on_click=self._open_path)
-        self._file = pmu.FileInput(
-            label="Upload .mcap or .zip", accept=".mcap,.zip", size="small", chunk_size=_CHUNK,
-            max_file_size=LARGEST_UPLOAD, max_total_file_size=LARGEST_UPLOAD, variant="outlined",
-        )  # fmt: skip
+        self._file = Upload()
         self._facts = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
         self._choice.param.watch(self._open_choice, "value")
         self._file.param.watch(self._open_upload, "value")
@@ -62,12 +60,16 @@ class SessionCard:
     async def _open_upload(self, event: Any) -> None:
         if not event.new:
             return
+        name = str(self._file.filename)
+        self._file.clear()  # the page need not keep it in memory
         try:
-            path = self._uploads.store(str(self._file.filename), event.new)
+            path = await asyncio.to_thread(self._uploads.store, name, event.new)
         except SessionError as error:
             self._state.error = str(error)
             return
         await self._open(str(path), self._camera.value_input or self._camera.value)
+        if self._state.session is None or not str(self._state.session.uri).startswith(str(path)):
+            self._uploads.drop(path)
 
     def _describe(self, event: Any) -> None:
         session: Session = event.new

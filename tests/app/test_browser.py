@@ -241,8 +241,11 @@ def test_trackers_are_compared_at_the_same_frame(page):
 
 def test_a_bad_path_is_one_sentence_in_the_page(page):
     button(page, "Open another session").click()
-    page.get_by_label("Path of a file or folder").fill("/no/such/session")
+    page.get_by_label("Path of a file or folder").fill("sessions/none.mcap")
     button(page, "Open").click()
-    page.get_by_text("There is no file or folder /no/such/session").wait_for()
+    page.get_by_text("There is no file or folder").wait_for()
+    page.get_by_label("Path of a file or folder").fill("/etc/hosts")
+    button(page, "Open").click()
+    page.get_by_text("/etc/hosts is in none of the folders that this page may open").wait_for()
     page.screenshot(path=ARTEFACTS / "bad-path.png")
     assert os.linesep + "Traceback" not in page.content()
