@@ -13,7 +13,6 @@ from app.address import Address, follow_in, place_of
 from app.controller import Controller
 from app.folders import SAMPLES, allowed
 from app.keeper import Keeper
-from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
 from app.runner import Runner
@@ -37,6 +36,7 @@ from app.views.start_card import StartCard
 from app.views.status import Status
 from app.views.tour import Tour
 from app.views.transport import Transport
+from spf.presets import Presets
 
 __all__ = ["page"]
 

@@ -8,7 +8,6 @@ import pytest
 from app.address import Address, Place, place_of
 from app.controller import Controller
 from app.lane import Lane
-from app.presets import Presets
 from app.preview import Previewer, _seen_again
 from app.reruns import Reruns
 from app.runner import Runner
@@ -19,7 +18,9 @@ from app.views.again_card import AgainCard
 from app.views.difference import Difference
 from app.views.landscape import LandscapeCard
 from app.views.runs_card import RunsCard
+from app.views.settings_card import SettingsCard
 from spf.errors import SettingError
+from spf.presets import Presets
 
 
 async def weighed(state):
@@ -97,6 +98,50 @@ def test_a_preset_is_saved_as_a_file_and_read_back(tmp_path):
     assert lane.differences == {}
     lane.tracker = "smd"
     assert lane.preset == "default"
+
+
+def test_a_preset_that_is_deleted_leaves_its_settings_to_who_uses_them(tmp_path):
+    presets = Presets(tmp_path)
+    lane = Lane(presets=presets)
+    lane.change("k", 2.5)
+    presets.save("spf", "mine", lane.settings)
+    lane.preset = "mine"
+    presets.delete("spf", "mine")
+    assert lane.differences == {}  # another page's, which knows nothing of it
+    lane.change("k", 4.0)
+    lane.back_to_preset()
+    assert lane.settings.k == 2.5
+    lane.without_preset()
+    assert (lane.preset, lane.settings.k, lane.differences) == ("default", 2.5, {"k": (Lane().settings.k, 2.5)})
+    for name in ("mine", "default", "../x"):
+        with pytest.raises(SettingError):
+            presets.delete("spf", name)
+
+
+def test_a_preset_is_deleted_in_the_page_with_two_clicks(tmp_path):
+    state, presets = State(), Presets(tmp_path)
+    state.lane.presets = presets
+    card = SettingsCard(state, presets)
+    assert not card._delete.visible
+    state.change("k", 2.5)
+    card._name.value = "mine"
+    card._save(None)
+    assert card._delete.visible
+    card._on_delete(None)
+    assert presets.names("spf")[-1] == "mine"
+    card._on_delete(None)
+    assert "mine" not in presets.names("spf")
+    assert (state.lane.preset, state.lane.settings.k, card._delete.visible, state.error) == ("default", 2.5, False, "")
+
+
+def test_a_damaged_preset_is_not_taken(tmp_path):
+    state, presets = State(), Presets(tmp_path)
+    state.lane.presets = presets
+    (tmp_path / "odd.spf.json").write_text("{")
+    card = SettingsCard(state, presets)
+    card._preset.value = "odd"
+    assert "damaged" in state.error
+    assert (state.lane.preset, card._preset.value) == ("default", "default")
 
 
 @pytest.mark.parametrize("name", ["", "default", "../up", "a/b", "taken"])
