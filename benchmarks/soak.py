@@ -2,7 +2,8 @@
 
 Serves the dashboard and drives Chromium through it in three parts: pages that all step, for minutes; pages that are opened,
 stepped and closed one after the other; and one page that tracks hundreds of frames while another one steps. Printed are the
-memory of the server and of its renderer, how long pages took to answer, and every error in the server's log.
+memory of the server and of its renderer, how long pages took from a press on Step to the new frame, how long the server alone
+took to answer (browsers need most of a small machine), and every error in the server's log.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import urllib.request
 from collections.abc import Iterator
@@ -62,12 +64,39 @@ _VISIT = """([pace]) => {
 }"""
 
 
+class Probe(threading.Thread):
+    """Asks the server for next to nothing, again and again: how long its event loop lets everybody wait."""
+
+    def __init__(self, address: str) -> None:
+        super().__init__(daemon=True)
+        self._address, self._waits, self._stop = f"{address}/metadata", [0.0], threading.Event()
+
+    def run(self) -> None:
+        """Ask until it is stopped."""
+        while not self._stop.wait(0.2):
+            began = time.monotonic()
+            with urllib.request.urlopen(self._address, timeout=120) as answer:
+                answer.read()
+            self._waits.append(time.monotonic() - began)
+
+    def longest(self) -> float:
+        """Take the longest wait, in s, since this was asked last."""
+        waits, self._waits = self._waits, [0.0]
+        return max(waits)
+
+    def stop(self) -> None:
+        """Ask no more."""
+        self._stop.set()
+        self.join()
+
+
 class Server(NamedTuple):
     """A dashboard that is served: its address, its process and its log."""
 
     address: str
     process: psutil.Process
     log: Path
+    probe: Probe
 
     def memory(self) -> dict[str, float]:
         """Memory of the server and of its renderer, MB."""
@@ -100,7 +129,10 @@ def _served(folder: Path) -> Iterator[Server]:
                     break
                 except OSError:
                     time.sleep(0.2)
-            yield Server(address, psutil.Process(process.pid), log)
+            probe = Probe(address)
+            probe.start()
+            yield Server(address, psutil.Process(process.pid), log, probe)
+            probe.stop()
         finally:
             process.terminate()
             process.wait(60)
@@ -137,11 +169,14 @@ def stepping(browser: Browser, server: Server, pages: int, minutes: float, pace:
     opened = [_started(browser, server) for _ in range(pages)]
     for page in opened:
         page.evaluate(_VISIT, [pace])
+    server.probe.longest()
     rows = []
     for minute in range(round(minutes)):
         opened[0].wait_for_timeout(60_000)
         answers = [answer for page in opened for answer in _answers(page)]
-        rows.append({"minute": minute + 1, **server.memory(), **_of(answers)})
+        rows.append(
+            {"minute": minute + 1, **server.memory(), "server_longest_s": server.probe.longest(), **_of(answers)}
+        )
         _print_row(rows[-1])
     for page in opened:
         page.close()
@@ -177,9 +212,10 @@ def long_run(browser: Browser, server: Server, session: Path, pace: float) -> di
     busy.get_by_role("button", name="Track to here", exact=True).click()
     busy.get_by_text(re.compile(rf"Tracking to frame {FAR}")).first.wait_for()
     other.evaluate(_VISIT, [pace])
+    server.probe.longest()
     busy.get_by_text(re.compile(rf"tracked to {FAR}")).first.wait_for()
     took = time.monotonic() - began
-    found = {"frames": FAR, "took_s": took, **_of(_answers(other))}
+    found = {"frames": FAR, "took_s": took, "server_longest_s": server.probe.longest(), **_of(_answers(other))}
     busy.close()
     other.close()
     return found
@@ -229,7 +265,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file that the figures are written to")
     parser.add_argument("--pages", type=int, default=8, help="that step at once")
     parser.add_argument("--minutes", type=float, default=10, help="that they step")
-    parser.add_argument("--pace", type=float, default=1.0, help="seconds from one step of a page to its next")
+    parser.add_argument("--pace", type=float, default=4.0, help="seconds from one step of a page to its next")
     parser.add_argument("--visits", type=int, default=20, help="pages that are opened and closed")
     options = parser.parse_args()
     figures = measure(options)
