@@ -78,10 +78,10 @@ class Address:
             await self._reruns.open(run, place.frame, beside=number > 0)
             if state.error:
                 break
-        if state.session is None and uri:  # the run is gone: its session may still be there
+        if state.session is None and uri and place.runs:  # the run is gone: its session may still be there
             error = state.error
             await self._controller.open(uri, place.camera)
-            state.error = state.error or error
+            state.error = error or state.error
         if place.view is not None:
             state.azimuth, state.elevation, state.zoom = place.view
         if place.mode and place.mode != state.mode and (place.mode == "help" or state.last is not None):

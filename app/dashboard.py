@@ -116,7 +116,7 @@ def page() -> pmu.Page:
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
-        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, controller.cancel).panel],
+        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, reruns.cancel).panel],
         main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip

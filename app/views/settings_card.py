@@ -112,7 +112,7 @@ class SettingsCard:
 
     def _unfold(self) -> list[Any]:
         self._unfolded = True
-        self._make()
+        self._make_others()
         return [self._others]
 
     def _make(self) -> None:
@@ -124,7 +124,10 @@ class SettingsCard:
         self._sliders.objects = [
             self._add(name, _slider(infos[name], values[name])) for name in SLIDERS if name in infos
         ]
-        groups: dict[str, list[Any]] = {}
+        self._make_others()
+
+    def _make_others(self) -> None:
+        infos, values, groups = self._infos, self._state.lane.settings.to_dict(), dict[str, list[Any]]()
         for name, info in infos.items():
             if self._unfolded and name not in SLIDERS:
                 groups.setdefault(info.group, []).append(self._add(name, _field(info, values[name])))
