@@ -194,9 +194,10 @@ def visits(browser: Browser, server: Server, count: int) -> list[dict[str, float
         if number % 5 == 0:
             rows.append({"visits": number, **server.memory()})
             _print_row(rows[-1])
-    time.sleep(GONE)
-    rows.append({"visits": count, **server.memory()})
-    _print_row(rows[-1])
+    if count:
+        time.sleep(GONE)
+        rows.append({"visits": count, **server.memory()})
+        _print_row(rows[-1])
     return rows
 
 
@@ -205,9 +206,11 @@ def long_run(browser: Browser, server: Server, session: Path, pace: float) -> di
     busy, other = _started(browser, server, session), _started(browser, server)
     slider = busy.get_by_role("slider", name="Frame", exact=True)
     slider.focus()
-    for _ in range(FAR // 10):
+    for frame in range(10, FAR + 1, 10):
         busy.keyboard.press("Shift+ArrowRight")
-        busy.wait_for_timeout(50)
+        busy.wait_for_function(
+            "([line, frame]) => line.ariaValueNow === frame", arg=[slider.element_handle(), str(frame)]
+        )
     began = time.monotonic()
     busy.get_by_role("button", name="Track to here", exact=True).click()
     busy.get_by_text(re.compile(rf"Tracking to frame {FAR}")).first.wait_for()

@@ -29,8 +29,8 @@ class SessionCard:
         self._state, self._open, self._uploads = state, open_, uploads
         self._paths = dict(bundled)
         self._choice = pmu.Select(
-            label="Session", options=self._paths, value=next(iter(self._paths.values()), None), size="small",
-            disabled=not self._paths, sizing_mode="stretch_width",
+            label="Session", options=self._paths, value=None, size="small", disabled=not self._paths,
+            sizing_mode="stretch_width",
         )  # fmt: skip
         self._path = pmu.TextInput(
             label="Path of a file or folder", size="small", sizing_mode="stretch_width",
@@ -51,8 +51,15 @@ class SessionCard:
         self.panel = pmu.Column(self._choice, self._facts, other, sizing_mode="stretch_width")
 
     async def _open_choice(self, event: Any) -> None:
-        if event.new and (self._state.session is None or event.new != str(self._state.session.uri)):
+        if event.new and event.new != self._shown():
             await self._open(event.new, "")
+            self._choice.value = (
+                self._shown()
+            )  # another one when it could not be opened, and then it can be chosen again
+
+    def _shown(self) -> str | None:
+        session = self._state.session
+        return None if session is None else str(session.uri)
 
     async def _open_path(self, _event: Any) -> None:
         await self._open(self._path.value_input or self._path.value, self._camera.value_input or self._camera.value)
