@@ -69,11 +69,11 @@ class Probe(threading.Thread):
 
     def __init__(self, address: str) -> None:
         super().__init__(daemon=True)
-        self._address, self._waits, self._stop = f"{address}/metadata", [0.0], threading.Event()
+        self._address, self._waits, self._ended = f"{address}/metadata", [0.0], threading.Event()
 
     def run(self) -> None:
         """Ask until it is stopped."""
-        while not self._stop.wait(0.2):
+        while not self._ended.wait(0.2):
             began = time.monotonic()
             with urllib.request.urlopen(self._address, timeout=120) as answer:
                 answer.read()
@@ -86,7 +86,7 @@ class Probe(threading.Thread):
 
     def stop(self) -> None:
         """Ask no more."""
-        self._stop.set()
+        self._ended.set()
         self.join()
 
 

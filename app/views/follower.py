@@ -1,4 +1,4 @@
-"""What follows the state: drawn when something changed, seldom while playing, and only while it is seen."""
+"""What follows the state: drawn when something changed, seldom while frames go by, and only while it is seen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.state import State
 
 __all__ = ["Follower"]
 
-_EVERY = 0.6  # s between two redraws while playing
+_EVERY = 0.6  # s between two redraws while frames go by: playing, or tracked in the background
 _PICTURES_FIRST = 80  # ms that the plots leave to the pictures, which are looked at first
 
 
@@ -33,7 +33,9 @@ class Follower(ABC):
         self, state: State, mode: str | None = "one", also: tuple[str, ...] = (), look: tuple[str, ...] = ()
     ) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
+        self._is_behind = False  # a redraw was left out
         state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
+        state.param.watch(self._catch_up, "task")
         state.look.param.watch(self._follow, ["tab", *look])
 
     def _follow(self, *_events: Any) -> None:
@@ -41,14 +43,19 @@ class Follower(ABC):
         if self._mode is not None and (self.state.mode != self._mode or hidden):
             return
         now = time.monotonic()
-        if self.state.playing and now - self._drawn < _EVERY:
-            return  # the next frame comes soon, and the end of playing redraws in any case
-        self._drawn = now
+        if (self.state.playing or self.state.task) and now - self._drawn < _EVERY:
+            self._is_behind = True
+            return  # the next frame comes soon, and the end of playing or of the task redraws in any case
+        self._drawn, self._is_behind = now, False
         document = pn.state.curdoc
         if document is None or document.session_context is None:
             self.draw()
         else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
             document.add_timeout_callback(self.draw, _PICTURES_FIRST)
+
+    def _catch_up(self, _event: Any) -> None:
+        if self._is_behind and not self.state.task:
+            self._follow()
 
     @abstractmethod
     def draw(self) -> None:

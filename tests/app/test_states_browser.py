@@ -61,6 +61,7 @@ def test_without_a_session_the_page_says_to_choose_one(room, recordings):
     address, log = room
     with visiting(f"{address}?session={quote(str(recordings / 'noise.bag'))}", log) as page:
         says(page, "is no session: it is a file of 2048 bytes that no reader knows")
+        says(page, "No session is open.")
         says(page, "Choose a session on the left", count=3)
         says(page, "Choose a session to see its depth images.")
         assert button(page, "Start").is_disabled()
@@ -101,7 +102,7 @@ def test_a_start_that_finds_nothing_and_a_missing_file_say_what_to_do(room, reco
         button(page, "Start").click()
         says(page, "There is no pose file")
         shot(page, "no-pose-file")
-        page.get_by_role("button", name="Close").click()
+        button(page, "Close").click()
         page.get_by_text("There is no pose file").wait_for(state="hidden")
 
 
