@@ -50,6 +50,8 @@ def _theme(primary: str) -> dict[str, Any]:
         "typography": {"fontSize": 13},
         "components": {
             "MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}},
+            # The buttons of numbers are as dark as in a light page otherwise.
+            "MuiInputAdornment": {"styleOverrides": {"root": {"& .MuiIconButton-root": {"color": "inherit"}}}},
             "MuiAppBar": {"styleOverrides": {"root": {"backgroundColor": f"{_BLUE} !important", "color": "white"}}},
         },
     }
