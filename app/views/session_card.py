@@ -20,6 +20,7 @@ from spf.sessions import Session
 __all__ = ["SessionCard", "described"]
 
 Open = Callable[[str, str], Awaitable[None]]
+_NONE = {"Choose one": ""}  # until a session is open
 
 
 class SessionCard:
@@ -29,7 +30,7 @@ class SessionCard:
         self._state, self._open, self._uploads = state, open_, uploads
         self._paths = dict(bundled)
         self._choice = pmu.Select(
-            label="Session", options=self._paths, value=None, size="small", disabled=not self._paths,
+            label="Session", options=_NONE | self._paths, value="", size="small", disabled=not self._paths,
             sizing_mode="stretch_width",
         )  # fmt: skip
         self._path = pmu.TextInput(
@@ -57,9 +58,9 @@ class SessionCard:
                 self._shown()
             )  # another one when it could not be opened, and then it can be chosen again
 
-    def _shown(self) -> str | None:
+    def _shown(self) -> str:
         session = self._state.session
-        return None if session is None else str(session.uri)
+        return "" if session is None else str(session.uri)
 
     async def _open_path(self, _event: Any) -> None:
         await self._open(self._path.value_input or self._path.value, self._camera.value_input or self._camera.value)

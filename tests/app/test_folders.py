@@ -3,6 +3,7 @@
 import os
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,6 +15,7 @@ from app.server import bundled, open_shared
 from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
+from app.views.session_card import SessionCard
 from spf.errors import RunError, SensorError, SessionError
 from spf.live.tracking import Request
 from spf.trackers import make_settings
@@ -116,3 +118,18 @@ def test_a_run_is_one_of_the_shelf(tmp_path, run):
     (tmp_path / "manifest.json").write_text("{}")
     with pytest.raises(RunError):
         Shelf(tmp_path / "runs").path(run)
+
+
+def test_a_session_that_could_not_be_opened_can_be_chosen_again(room, act):
+    state = State()
+    controller = Controller(state, Runner(), open_shared, allowed=allowed)
+    refused = str(room[1] / "mine.mcap")
+    card = SessionCard(state, controller.open, bundled() | {"mine": refused}, Uploads())
+    assert card._choice.value == ""  # nothing is open, and nothing is shown as if it were
+    for before in ("", bundled()["open-close"]):
+        act(lambda uri=before: card._open_choice(SimpleNamespace(new=uri)))
+        card._choice.value = refused
+        act(lambda: card._open_choice(SimpleNamespace(new=refused)))
+        assert "none of the folders" in state.error
+        assert card._choice.value == before
+    controller.close()
