@@ -1,14 +1,16 @@
-"""The page's address holds what it shows: session, runs, frame and view; opened elsewhere, it shows the same."""
+"""The page's address holds what it shows: session, runs, frame, view and look; opened elsewhere, it shows the same."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 from urllib.parse import urlencode
 
 from app.controller import Controller
+from app.look_address import LOOK, look_of, said_of
 from app.reruns import Reruns
 from app.state import MODES, State
 
@@ -27,6 +29,7 @@ class Place(NamedTuple):
         frame: that is shown.
         mode: one tracker, or several.
         view: azimuth and elevation in radians, zoom.
+        look: value of parameters of :class:`app.look.Look`.
     """
 
     session: str = ""
@@ -35,6 +38,7 @@ class Place(NamedTuple):
     frame: int | None = None
     mode: str = ""
     view: tuple[float, float, float] | None = None
+    look: Mapping[str, Any] = MappingProxyType({})
 
 
 def place_of(query: Mapping[str, Any]) -> Place:
@@ -48,7 +52,7 @@ def place_of(query: Mapping[str, Any]) -> Place:
     return Place(
         str(query.get("session", "")), str(query.get("camera", "")),
         tuple(run for run in str(query.get("run", "")).split(",") if run),
-        int(frame) if frame.isdecimal() else None, mode if mode in MODES.values() else "", view,
+        int(frame) if frame.isdecimal() else None, mode if mode in MODES.values() else "", view, look_of(query),
     )  # fmt: skip
 
 
@@ -66,6 +70,7 @@ class Address:
     async def go(self, place: Place) -> None:
         """Show what an address says; a session if it says nothing."""
         state, samples = self._state, self._samples
+        state.look.param.update(**place.look)
         uri = samples.get(place.session, place.session) or next(iter(samples.values()), "")
         if uri and not place.runs:
             await self._controller.open(uri, place.camera)
@@ -73,13 +78,13 @@ class Address:
             await self._reruns.open(run, place.frame, beside=number > 0)
             if state.error:
                 break
-        if state.session is None and uri:  # the run is gone: its session may still be there
+        if state.session is None and uri and place.runs:  # the run is gone: its session may still be there
             error = state.error
             await self._controller.open(uri, place.camera)
-            state.error = state.error or error
+            state.error = error or state.error
         if place.view is not None:
             state.azimuth, state.elevation, state.zoom = place.view
-        if place.mode and place.mode != state.mode and state.last is not None:
+        if place.mode and place.mode != state.mode and (place.mode == "help" or state.last is not None):
             await self._controller.show_mode(place.mode)
         if place.frame is not None and state.session is not None:
             self._controller.look(place.frame)
@@ -98,7 +103,7 @@ class Address:
             "session": name, "camera": state.camera or None, "run": runs or None, "frame": state.frame,
             "view": state.mode, "eye": turned,
         }  # fmt: skip
-        return {name: value for name, value in said.items() if value is not None}
+        return {name: value for name, value in said.items() if value is not None} | said_of(state.look)
 
 
 def follow_in(location: Any, state: State, address: Address) -> None:
@@ -107,7 +112,7 @@ def follow_in(location: Any, state: State, address: Address) -> None:
 
     async def write() -> None:
         await asyncio.sleep(_A_MOMENT)
-        location.search = "?" + urlencode(address.query())
+        location.search = "?" + urlencode(address.query(), safe=",/")
 
     def changed(*_events: Any) -> None:
         if state.playing or (writing and not writing[-1].done()):
@@ -117,4 +122,5 @@ def follow_in(location: Any, state: State, address: Address) -> None:
     state.param.watch(
         changed, ["session", "frame", "mode", "lane", "lanes", "shelf", "azimuth", "elevation", "zoom", "playing"]
     )
+    state.look.param.watch(changed, list(LOOK))
     changed()

@@ -1,6 +1,10 @@
 """What a server does before the first page is asked for: compile the kernels and start the renderer."""
 
+import asyncio
 from typing import Any
+
+from tornado.ioloop import IOLoop
+from tornado.websocket import WebSocketClosedError
 
 from app.server import kernels, renderer
 
@@ -9,3 +13,13 @@ def on_server_loaded(_server_context: Any) -> None:
     """Begin both in the background."""
     kernels()
     renderer()
+    IOLoop.current().asyncio_loop.set_exception_handler(_tell)  # type: ignore[attr-defined]
+
+
+def _tell(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Log what went wrong in a task that nobody waits for.
+
+    Who leaves a page while a message is on its way to it is no error: Bokeh knows and says so, but leaves tornado's task behind.
+    """
+    if not isinstance(context.get("exception"), WebSocketClosedError):
+        loop.default_exception_handler(context)

@@ -11,14 +11,14 @@ import param
 
 from app.address import Address, follow_in, place_of
 from app.controller import Controller
+from app.folders import SAMPLES, allowed
 from app.keeper import Keeper
 from app.marking import Marking
 from app.posing import Posing
-from app.presets import Presets
 from app.preview import Previewer
 from app.reruns import Reruns
 from app.runner import Runner
-from app.server import SAMPLES, bundled, kernels, open_shared, renderer
+from app.server import bundled, kernels, open_shared, renderer
 from app.shelf import Shelf
 from app.state import State
 from app.uploads import Uploads
@@ -40,6 +40,7 @@ from app.views.start_card import StartCard
 from app.views.status import Status
 from app.views.tour import Tour
 from app.views.transport import Transport
+from spf.presets import Presets
 
 __all__ = ["page"]
 
@@ -53,6 +54,8 @@ def _theme(primary: str) -> dict[str, Any]:
         "typography": {"fontSize": 13},
         "components": {
             "MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}},
+            # The buttons of numbers are as dark as in a light page otherwise.
+            "MuiInputAdornment": {"styleOverrides": {"root": {"& .MuiIconButton-root": {"color": "inherit"}}}},
             "MuiAppBar": {"styleOverrides": {"root": {"backgroundColor": f"{_BLUE} !important", "color": "white"}}},
         },
     }
@@ -68,7 +71,7 @@ def page() -> pmu.Page:
     state, samples, uploads = State(), bundled(), Uploads()
     modes = Modes(state, renderer())
     shelf, presets = Shelf(), Presets()
-    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf))
+    controller = Controller(state, Runner(), open_shared, modes.drawn, kernels().wait, Keeper(state, shelf), allowed)
     reruns, previewer = Reruns(controller, shelf), Previewer(state)
     posing = Posing(controller, shelf.folder)
     marking = Marking(controller)
@@ -123,7 +126,7 @@ def page() -> pmu.Page:
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
     built = pmu.Page(
-        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, controller.cancel).panel],
+        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, reruns.cancel).panel],
         main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
         theme_config=_THEME, busy_indicator=None,
     )  # fmt: skip

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 
 import param
 
-from app.presets import Presets
 from app.results import Entry, Results, Summary, same_rules
 from spf.errors import StartError
 from spf.initialise import Start
 from spf.manifest import Plan
+from spf.presets import Presets
 from spf.settings import Settings
 from spf.track import Tracking, TrackState, begin
 from spf.trackers import TRACKERS, make_settings
@@ -55,6 +55,7 @@ class Lane(param.Parameterized):
 
     def __init__(self, tracker: str = "spf", colour: str = "", presets: Presets | None = None) -> None:
         super().__init__(tracker=tracker, settings=make_settings(tracker))
+        self._base = self.settings  # the preset's
         self.colour = colour
         self.results = Results()
         self.presets = presets or Presets()
@@ -73,10 +74,8 @@ class Lane(param.Parameterized):
                 return
         else:
             self._undo.append(self.settings)
-        self.settings = self._preset_settings()
-
-    def _preset_settings(self) -> Settings:
-        return self.presets.settings(self.tracker, self.preset)
+        self._base = self.presets.settings(self.tracker, self.preset)  # held: its file may be deleted meanwhile
+        self.settings = self._base
 
     # ---- settings
 
@@ -106,12 +105,19 @@ class Lane(param.Parameterized):
 
     def back_to_preset(self) -> None:
         """Undo every change of a setting."""
-        self._take_preset()
+        self._undo.append(self.settings)
+        self.settings = self._base
+
+    def without_preset(self) -> None:
+        """The preset is deleted: go on with its settings, told as changes of the default ones."""
+        settings = self.settings
+        self.preset = "default"
+        self.settings = settings
 
     @property
     def differences(self) -> dict[str, tuple[Any, Any]]:
         """Settings that differ from the preset: name → (preset's value, value)."""
-        preset = self._preset_settings().to_dict()
+        preset = self._base.to_dict()
         return {name: (preset[name], value) for name, value in self.settings.to_dict().items() if value != preset[name]}
 
     @property

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from app.folders import allowed_source
 from app.runner import Report
 from spf.errors import SessionError, SpfError
 from spf.frame import Frame
@@ -70,12 +71,13 @@ class Live:
         kernels: waits until the kernels are compiled.
 
     Raises:
+        OutsideError: it replays a recording that a page may not open.
         SensorError: the URI is wrong, or what it needs is not installed. A sensor that is missing is waited for.
     """
 
     def __init__(self, uri: str, request: Request, kernels: Callable[[Report], None] = lambda _report: None) -> None:
         self._request, self._kernels = request, kernels
-        self._feed = Feed(open_live(uri), wait=True).start()
+        self._feed = Feed(open_live(allowed_source(uri)), wait=True).start()
         self._stop = threading.Event()
         self._doing, self._error = "Connecting", ""
         self._picture: LivePicture | None = None

@@ -34,7 +34,15 @@ class Reruns:
         self._state: State = controller.state
         self._controller, self._shelf = controller, shelf
         self._recalling: asyncio.Task[None] | None = None
+        self._given_up: int | None = None  # frame whose particles the visitor did not want to wait for
         self._state.param.watch(self._recall_soon, ["revision", "task"])
+
+    def cancel(self) -> None:
+        """Give up what runs in the background, and compute no particles again before another frame is looked at."""
+        self._given_up = self._state.frame
+        if self._recalling is not None:
+            self._recalling.cancel()
+        self._controller.cancel()
 
     async def rerun(self, frame: int | None = None) -> None:
         """Track the chosen lane again with the present settings, from a frame (or its first) to the last one it had.
@@ -149,7 +157,11 @@ class Reruns:
 
     def _recall_soon(self, *_events: object) -> None:
         state = self._state
+        if state.frame != self._given_up:
+            self._given_up = None
         if state.busy or state.session is None or state.origin is None or not self._missing():
+            return
+        if self._given_up is not None:
             return
         if self._recalling is not None:
             self._recalling.cancel()

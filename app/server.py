@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import atexit
 from functools import lru_cache
-from pathlib import Path
 
 import panel as pn
 
+from app.folders import SAMPLES, allowed_session
 from app.kernels import Kernels
 from spf.render import Renderer
 from spf.sessions import Session, open_session
@@ -16,8 +16,6 @@ from spf.sessions.marks import marks_file
 
 __all__ = ["SAMPLES", "bundled", "kernels", "open_shared", "renderer"]
 
-#: Where the sample sessions are, and where new captures land.
-SAMPLES = Path(__file__).resolve().parent.parent / "sessions"
 _KEPT = 3600  # s that an opened session is kept for the next who asks
 
 
@@ -46,12 +44,13 @@ def open_shared(uri: str, camera: str | None) -> Session:
     """Open a session once for all pages; a file that changed, or whose marks did, is opened again.
 
     Raises:
+        OutsideError: it is in none of the folders that a page may open.
         SessionError: see :func:`spf.sessions.open_session`.
     """
-    path = Path(uri).expanduser()
-    files = path, marks_file(split_uri(path)[0])
-    stamp = [file.stat().st_mtime_ns for file in files if file.exists()]
+    uri, camera = allowed_session(uri, camera)
+    path, _ = split_uri(uri)
+    stamp = [file.stat().st_mtime_ns for file in (path, marks_file(path)) if file.exists()]
     session: Session = pn.state.as_cached(
-        f"session {path.absolute()} {camera} {stamp}", lambda: open_session(path, camera), ttl=_KEPT
+        f"session {uri} {camera} {stamp}", lambda: open_session(uri, camera), ttl=_KEPT
     )
     return session

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import datetime
 import io
-import os
 import re
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from app.folders import runs_folder
 from app.lane import Lane, Origin
 from app.results import Results
 from app.runner import Report
@@ -51,7 +51,7 @@ class Shelf:
     """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self.folder = Path(os.environ.get("SPF_RUNS", "runs")) if folder is None else folder
+        self.folder = runs_folder() if folder is None else folder
 
     def runs(self) -> tuple[Kept, ...]:
         """Return the runs, the newest first; one that is damaged says so for a label, and has no manifest."""
@@ -73,7 +73,7 @@ class Shelf:
         Raises:
             RunError: there is none of this name.
         """
-        if not run or Path(run).name != run or not (self.folder / run / MANIFEST).is_file():
+        if run in ("", "..") or Path(run).name != run or not (self.folder / run / MANIFEST).is_file():
             raise RunError(f"There is no run '{run}' in {self.folder}: choose one from the list of runs.")
         return self.folder / run
 

@@ -1,4 +1,4 @@
-"""What follows the state: drawn when something changed, seldom while playing, and only while it is seen."""
+"""What follows the state: drawn when something changed, seldom while frames go by, and only while it is seen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from app.state import State
 
 __all__ = ["Follower"]
 
-_EVERY = 1.0  # s between two redraws while playing
+_EVERY = 1.0  # s between two redraws while frames go by: playing, or tracked in the background
 _PICTURES_FIRST = 400  # ms that the plots wait at most for the pictures of a frame, which are looked at first
 
 
@@ -34,8 +34,10 @@ class Follower(ABC):
     ) -> None:
         self.state, self._mode, self._drawn = state, mode, 0.0
         self._waiting: Any = None  # the document's callback that draws at the latest
+        self._is_behind = False  # a redraw was left out
         state.param.watch(self._follow, ["revision", "playing", "previewed", *also])
         state.param.watch(self._pictured, "pictured")
+        state.param.watch(self._catch_up, "task")
         state.look.param.watch(self._follow, ["tab", *look])
 
     def _follow(self, *events: Any) -> None:
@@ -43,9 +45,10 @@ class Follower(ABC):
         if self._mode is not None and (self.state.mode != self._mode or hidden):
             return
         now = time.monotonic()
-        if self.state.playing and now - self._drawn < _EVERY:
-            return  # the next frame comes soon, and the end of playing redraws in any case
-        self._drawn = now
+        if (self.state.playing or self.state.task) and now - self._drawn < _EVERY:
+            self._is_behind = True
+            return  # the next frame comes soon, and the end of playing or of the task redraws in any case
+        self._drawn, self._is_behind = now, False
         document = pn.state.curdoc
         if document is None or document.session_context is None:
             self.draw()
@@ -65,6 +68,10 @@ class Follower(ABC):
     def _draw(self) -> None:
         self._waiting = None
         self.draw()
+
+    def _catch_up(self, _event: Any) -> None:
+        if self._is_behind and not self.state.task:
+            self._follow()
 
     @abstractmethod
     def draw(self) -> None:

@@ -8,10 +8,11 @@ __all__ = ["Names"]
 
 
 class Names(JSComponent):
-    """Takes no room. Looks through the page whenever it changes, and names progress bars, hints and the buttons of numbers.
+    """Takes no room. Looks through the page whenever it changes, and names progress bars, hints, the buttons of numbers and the
+    body of tables.
 
-    Panel's Material widgets draw these without a role or a name (axe-core: aria-progressbar-name, aria-prohibited-attr,
-    button-name), and have no parameter for it.
+    Panel's widgets draw these without a role or a name (axe-core: aria-progressbar-name, aria-prohibited-attr, button-name,
+    aria-required-children), and have no parameter for it.
     """
 
     _esm = """
@@ -22,6 +23,10 @@ class Names(JSComponent):
         const label = it.closest('.MuiFormControl-root')?.querySelector('label')?.textContent ?? 'Number';
         const less = it.closest('.MuiInputAdornment-positionStart');
         it.setAttribute('aria-label', `${label.replace('*', '').trim()}: ${less ? 'less' : 'more'}`);
+      }],
+      ['.tabulator-tableholder:not([role])', (it) => {  // it can be focused, so that it is a part of the grid
+        it.setAttribute('role', 'rowgroup');
+        it.querySelector('.tabulator-table')?.setAttribute('role', 'presentation');
       }],
     ];
 

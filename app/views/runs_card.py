@@ -119,6 +119,7 @@ class RunsCard:
             options[label if label not in options else f"{label} ({kept.run})"] = kept.run
         value = self._chosen if self._chosen in self._runs else next(iter(self._runs), None)
         self._choice.param.update(options=options, value=value, disabled=not options)
+        self._choice.param.trigger("value")  # the browser knows it by its label, which may be another one now
         self._describe()
 
     def _describe(self, *_events: Any) -> None:

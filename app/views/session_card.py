@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import html
 from collections.abc import Awaitable, Callable
 from typing import Any
@@ -10,15 +11,16 @@ import panel as pn
 import panel_material_ui as pmu
 
 from app.state import State
-from app.uploads import LARGEST_UPLOAD, Uploads
+from app.uploads import Uploads
 from app.views.fold import folded
+from app.views.upload import Upload
 from spf.errors import SessionError
 from spf.sessions import Session
 
 __all__ = ["SessionCard", "described"]
 
 Open = Callable[[str, str], Awaitable[None]]
-_CHUNK = 4 * 2**20  # bytes of an upload in one message
+_NONE = {"Choose one": ""}  # until a session is open
 
 
 class SessionCard:
@@ -28,8 +30,8 @@ class SessionCard:
         self._state, self._open, self._uploads = state, open_, uploads
         self._paths = dict(bundled)
         self._choice = pmu.Select(
-            label="Session", options=self._paths, value=next(iter(self._paths.values()), None), size="small",
-            disabled=not self._paths, sizing_mode="stretch_width",
+            label="Session", options=_NONE | self._paths, value="", size="small", disabled=not self._paths,
+            sizing_mode="stretch_width",
         )  # fmt: skip
         self._path = pmu.TextInput(
             label="Path of a file or folder", size="small", sizing_mode="stretch_width",
@@ -40,10 +42,7 @@ class SessionCard:
             description="For a folder of images that has no camera.json of its own.",
         )  # fmt: skip
         go = pmu.Button(label="Open", icon="folder_open", size="small", on_click=self._open_path)
-        self._file = pmu.FileInput(
-            label="Upload .mcap or .zip", accept=".mcap,.zip", size="small", chunk_size=_CHUNK,
-            max_file_size=LARGEST_UPLOAD, max_total_file_size=LARGEST_UPLOAD, variant="outlined",
-        )  # fmt: skip
+        self._file = Upload()
         self._facts = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 10))
         self._choice.param.watch(self._open_choice, "value")
         self._file.param.watch(self._open_upload, "value")
@@ -53,8 +52,15 @@ class SessionCard:
         self.panel = pmu.Column(self._choice, self._facts, other, sizing_mode="stretch_width")
 
     async def _open_choice(self, event: Any) -> None:
-        if event.new and (self._state.session is None or event.new != str(self._state.session.uri)):
+        if event.new and event.new != self._shown():
             await self._open(event.new, "")
+            self._choice.value = (
+                self._shown()
+            )  # another one when it could not be opened, and then it can be chosen again
+
+    def _shown(self) -> str:
+        session = self._state.session
+        return "" if session is None else str(session.uri)
 
     async def _open_path(self, _event: Any) -> None:
         await self._open(self._path.value_input or self._path.value, self._camera.value_input or self._camera.value)
@@ -62,12 +68,16 @@ class SessionCard:
     async def _open_upload(self, event: Any) -> None:
         if not event.new:
             return
+        name = str(self._file.filename)
+        self._file.clear()  # the page need not keep it in memory
         try:
-            path = self._uploads.store(str(self._file.filename), event.new)
+            path = await asyncio.to_thread(self._uploads.store, name, event.new)
         except SessionError as error:
             self._state.error = str(error)
             return
         await self._open(str(path), self._camera.value_input or self._camera.value)
+        if self._state.session is None or not str(self._state.session.uri).startswith(str(path)):
+            self._uploads.drop(path)
 
     def _describe(self, event: Any) -> None:
         session: Session = event.new

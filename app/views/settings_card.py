@@ -9,12 +9,12 @@ from typing import Any
 import panel as pn
 import panel_material_ui as pmu
 
-from app.presets import Presets
 from app.state import State
 from app.views.fold import folded
 from spf.errors import SettingError
+from spf.presets import Presets
 from spf.settings import SettingInfo
-from spf.trackers import TRACKERS
+from spf.trackers import PRESETS, TRACKERS
 
 __all__ = ["SettingsCard"]
 
@@ -52,6 +52,11 @@ class SettingsCard:
         )  # fmt: skip
         self._name = pmu.TextInput(label="Name of a new preset", size="small", sizing_mode="stretch_width")
         save = pmu.Button(label="Save", icon="save", size="small", on_click=self._save, margin=(10, 10))
+        self._asked = ""  # preset that was asked to be deleted once
+        self._delete = pmu.Button(
+            label="", icon="delete", size="small", variant="outlined", margin=(3, 10), visible=False,
+            on_click=self._on_delete,
+        )  # fmt: skip
         self._tracker.param.watch(self._picked("tracker"), "value")
         self._preset.param.watch(self._picked("preset"), "value")
         state.param.watch(self._follow, ["rules", "lane"])
@@ -61,6 +66,7 @@ class SettingsCard:
             pmu.Row(self._undo, self._back, margin=0),
             folded("All other settings", self._unfold),
             folded("Save as a preset", lambda: [pmu.Row(self._name, save, sizing_mode="stretch_width", margin=0)]),
+            self._delete,
             sizing_mode="stretch_width",
         )  # fmt: skip
 
@@ -68,10 +74,14 @@ class SettingsCard:
         def picked(event: Any) -> None:
             if event.new is None or event.new == getattr(self._state.lane, name):
                 return
+            lane = self._state.lane
             try:
-                setattr(self._state.lane, name, event.new)
+                if name == "preset":
+                    self._presets.settings(lane.tracker, event.new)  # one that is damaged is not taken
+                setattr(lane, name, event.new)
             except SettingError as error:
                 self._state.error = str(error)
+                self._state.rules += 1  # puts the list back
 
         return picked
 
@@ -84,9 +94,25 @@ class SettingsCard:
         except SettingError as error:
             self._state.error = str(error)
 
+    def _on_delete(self, _event: Any) -> None:
+        lane = self._state.lane
+        if self._asked != lane.preset:
+            self._asked = lane.preset
+            self._delete.param.update(label="Really delete?", color="error")
+            return
+        name = lane.preset
+        try:
+            self._presets.delete(lane.tracker, name)
+        except SettingError as error:
+            self._state.error = str(error)
+            return
+        for other in self._state.lanes:
+            if (other.tracker, other.preset) == (lane.tracker, name):
+                other.without_preset()
+
     def _unfold(self) -> list[Any]:
         self._unfolded = True
-        self._make()
+        self._make_others()
         return [self._others]
 
     def _make(self) -> None:
@@ -98,7 +124,10 @@ class SettingsCard:
         self._sliders.objects = [
             self._add(name, _slider(infos[name], values[name])) for name in SLIDERS if name in infos
         ]
-        groups: dict[str, list[Any]] = {}
+        self._make_others()
+
+    def _make_others(self) -> None:
+        infos, values, groups = self._infos, self._state.lane.settings.to_dict(), dict[str, list[Any]]()
         for name, info in infos.items():
             if self._unfolded and name not in SLIDERS:
                 groups.setdefault(info.group, []).append(self._add(name, _field(info, values[name])))
@@ -122,7 +151,12 @@ class SettingsCard:
     def _follow(self, *_events: Any) -> None:
         lane = self._state.lane
         self._tracker.value = lane.tracker
-        self._preset.param.update(options=self._presets.names(lane.tracker), value=lane.preset)
+        names = self._presets.names(lane.tracker)
+        self._preset.param.update(options=list(dict.fromkeys([*names, lane.preset])), value=lane.preset)
+        self._asked = ""
+        self._delete.param.update(
+            label=f"Delete the preset {lane.preset}", color="default", visible=lane.preset in names[len(PRESETS) :]
+        )
         self._undo.disabled = not lane.can_undo
         if self._made_for != lane.tracker:
             self._make()

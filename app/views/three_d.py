@@ -25,6 +25,10 @@ Size = tuple[int, int]
 _SIZES: tuple[Size, Size] = (368, 276), (736, 552)  # quick, sharp
 _SETTLED = 0.3  # s without a movement after which the sharp pictures are drawn
 _PATIENCE = 1.0  # s that playing waits for a browser that shows nothing, such as a hidden tab
+_WITHOUT = "Then start the server again; everything else on this page works without."
+_WHEN_LOST = (
+    "It is looked for in every frame: go on with Step or Play, or re-run from a frame before with other settings."
+)
 _log = logging.getLogger(__name__)
 
 
@@ -132,7 +136,7 @@ class ThreeD:
                 await asyncio.sleep(_SETTLED)
         except RenderUnavailableError as error:
             for pane in self.panes.values():
-                pane.param.update(image=b"", hint=str(error))
+                pane.param.update(image=b"", hint=f"{error} {_WITHOUT}")
         except RenderError as error:
             self._state.error = str(error)
         except Exception:
@@ -179,8 +183,10 @@ class ThreeD:
     def _hint(self, lane: Lane) -> str:
         """What is said in place of a picture."""
         state, summary = self._state, lane.summary(self._state.frame)
+        if state.session is None:
+            return "Choose a session on the left, or open another one there."
         if lane.loss(state.frame):
-            return lane.loss(state.frame)
+            return f"{lane.loss(state.frame)}. {_WHEN_LOST}"
         if summary is None and (state.task or state.preparing):
             return f"{state.task or state.preparing} …"
         if state.origin is None:

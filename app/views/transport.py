@@ -91,7 +91,7 @@ class Transport(Follower):
     def _readout(self) -> str:
         state = self.state
         if state.session is None:
-            return ""
+            return "No session is open."
         last, summaries = state.last, [lane.summary(state.frame) for lane in state.active]
         tracked = "not tracked" if last is None else f"tracked to {last}"
         took = f" · {1000 * sum(s.seconds for s in summaries if s is not None):.0f} ms" if any(summaries) else ""

@@ -62,10 +62,13 @@ def viewpoints(state: State) -> pmu.Row:
     )  # fmt: skip
 
     def toggle(event: Any) -> None:
+        if event.new == (state.look.anchor is None):
+            return  # it follows
         entry = state.entry
         state.look.anchor = None if event.new or entry is None else hand_view(entry)
 
     follow.param.watch(toggle, "value")
+    state.look.param.watch(lambda event: follow.param.update(value=event.new is None), "anchor")
     return pmu.Row(_picked(state), *(button(name) for name in VIEWS), follow, margin=0, align="center")
 
 

@@ -45,7 +45,9 @@ def compare_trackers(
     presets: Annotated[
         list[str] | None,
         typer.Option(
-            "--preset", metavar="[LABEL=]PRESET", help=f"One of {', '.join(PRESETS)}, for all or one; repeatable."
+            "--preset",
+            metavar="[LABEL=]PRESET",
+            help=f"One of {', '.join(PRESETS)}, a saved one or its file, for all or one; repeatable.",
         ),
     ] = None,
     assignments: Annotated[

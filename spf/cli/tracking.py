@@ -32,9 +32,10 @@ from spf.live import is_live
 from spf.live.tracking import Request
 from spf.manifest import Plan, manifest_of
 from spf.prepare import prepare
+from spf.presets import chosen_settings
 from spf.runs import RECORDING, RunWriter, check_free, read_run, reopen_session, track_plan
 from spf.sessions import Session
-from spf.trackers import PRESETS, TRACKERS, make_settings
+from spf.trackers import PRESETS, TRACKERS
 from spf.trackfile import Track
 
 __all__ = ["COMMANDS", "calibrate", "track"]
@@ -85,7 +86,13 @@ def track(
         str | None, typer.Argument(metavar="SESSION", help="An MCAP file, a folder of depth images or a live sensor.")
     ] = None,
     tracker: Annotated[str | None, typer.Option(help=f"One of {', '.join(TRACKERS)}; spf if not given.")] = None,
-    preset: Annotated[str | None, typer.Option(help=f"One of {', '.join(PRESETS)}; default if not given.")] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE.json",
+            help=f"One of {', '.join(PRESETS)}, one saved in the page, or its file; default if not given.",
+        ),
+    ] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, as --set k=3 --set n=4; repeatable."),
@@ -114,6 +121,8 @@ def track(
 
         spf track recordings/P5 -o runs/b --preset paper --set n=16 --frames 0:300 --seed 3
 
+        spf track recordings/P5 -o runs/mine --preset "presets/my hand.spf.json"
+
         spf track --repeat runs/b -o runs/c
 
         spf track replay:sessions/open-close.mcap -o runs/live
@@ -130,18 +139,16 @@ def track(
         raise SettingError("There is nothing to track: name a session, as in spf track SESSION -o DIR.")
     elif is_live(session):
         _refuse_live({"--frames": frames, "--camera": camera, "--init": None if init == "auto" else init})
-        settings = make_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
+        name, settings = chosen_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
         shape = None if hand is None else read_hand_shape(hand)
-        request = Request(
-            tracker or "spf", preset or "default", settings, seed or 0, shape, None if shape is None else shape.side
-        )
+        request = Request(tracker or "spf", name, settings, seed or 0, shape, None if shape is None else shape.side)
         track_live(
             session, output, output / RECORDING, request, seconds=seconds, wait=wait, force=force, as_json=as_json
         )
         return
     else:
         _refuse_recorded(seconds, wait)
-        settings = make_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
+        name, settings = chosen_settings(tracker or "spf", preset or "default", parse_assignments(assignments or []))
         shape = None if hand is None else read_hand_shape(hand)
         opened = open_given(session, camera)
         first, last = parse_range(frames, len(opened))
@@ -149,7 +156,7 @@ def track(
             start = prepare(
                 opened, init=init or "auto", shape=shape, seed=seed or 0, first=first, last=last, progress=report
             )
-        plan = Plan(tracker or "spf", preset or "default", settings, seed or 0, init or "auto", first, last, start)
+        plan = Plan(tracker or "spf", name, settings, seed or 0, init or "auto", first, last, start)
     with opened:
         warn_of(plan.start)
         track_found = _track_to(output, opened, plan, camera, force, live)

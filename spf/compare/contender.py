@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 from spf.errors import SettingError
+from spf.presets import chosen_settings
 from spf.settings import Settings
-from spf.trackers import TRACKERS, make_settings
+from spf.trackers import TRACKERS
 
 __all__ = ["Contender", "contenders_of"]
 
@@ -62,7 +63,7 @@ def contenders_of(
     chosen = _presets_of(trackers, presets)
     changes = _changes_of(trackers, assignments or {})
     return tuple(
-        Contender(label, tracker, chosen[label], make_settings(tracker, chosen[label], changes[label]))
+        Contender(label, tracker, *chosen_settings(tracker, chosen[label], changes[label]))
         for label, tracker in trackers.items()
     )
 

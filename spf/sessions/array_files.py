@@ -164,6 +164,8 @@ class Hdf5File(ArrayFile):
 
     def _meet(self, name: str, found: Any) -> bool | None:
         if isinstance(found, h5py.Dataset) and found.shape is not None and found.dtype.kind in "uifS":
+            if found.external or found.is_virtual:  # an upload could so read any file of the server
+                raise ValueError(f"the numbers of {name} lie in other files: copy them into one")
             self.arrays[name] = ArrayInfo(tuple(map(int, found.shape)), found.dtype)
             for key, value in _attributes(found).items():
                 self.values.setdefault(key, value)

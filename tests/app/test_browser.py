@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -30,22 +31,30 @@ TROUBLE = re.compile(r"Traceback|\bERROR\b|Error running|Exception|exception")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory, shelf):
-    """The address of a server, and its log so far."""
+@contextmanager
+def serving(log, *options, **variables):
+    """Serve the dashboard with options of ``panel serve`` and environment variables; yields its address."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    log = tmp_path_factory.mktemp("server") / "log"
     with log.open("w") as file:
-        command = [sys.executable, "-m", "panel", "serve", "app", "--port", str(port)]
-        process = subprocess.Popen(command, cwd=REPOSITORY, stdout=file, stderr=subprocess.STDOUT)
+        command = [sys.executable, "-m", "panel", "serve", "app", "--port", str(port), *options]
+        environment = os.environ | variables
+        process = subprocess.Popen(command, cwd=REPOSITORY, stdout=file, stderr=subprocess.STDOUT, env=environment)
         try:
             _wait_for(f"http://localhost:{port}/app", process)
-            yield f"http://localhost:{port}/app", log
+            yield f"http://localhost:{port}/app"
         finally:
             process.terminate()
             process.wait(60)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, shelf):
+    """The address of a server, and its log so far."""
+    log = tmp_path_factory.mktemp("server") / "log"
+    with serving(log) as address:
+        yield address, log
 
 
 def _wait_for(address, process):
@@ -59,10 +68,9 @@ def _wait_for(address, process):
     pytest.fail("the server did not come up")
 
 
-@pytest.fixture
-def page(server):
-    """A loaded page; at the end, it has asked no other host for anything, and neither side has complained."""
-    address, log = server
+@contextmanager
+def visiting(address, log):
+    """A page; at the end, it has asked no other host for anything, and neither side has complained."""
     ARTEFACTS.mkdir(exist_ok=True)
     elsewhere, complaints = [], []
     with sync_playwright() as playwright:
@@ -74,7 +82,6 @@ def page(server):
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.add_init_script("localStorage.setItem('spf-tour', localStorage.getItem('spf-tour') ?? 'seen')")
         page.goto(address)
-        picture(page, "Depth image").wait_for()
         try:
             yield page
         finally:
@@ -84,6 +91,14 @@ def page(server):
     assert elsewhere == []
     assert complaints == []
     assert not [line for line in log.read_text().splitlines() if TROUBLE.search(line)]
+
+
+@pytest.fixture
+def page(server):
+    """A loaded page, as :func:`visiting` has it."""
+    with visiting(*server) as page:
+        picture(page, "Depth image").wait_for()
+        yield page
 
 
 def _is_elsewhere(url):
@@ -241,8 +256,11 @@ def test_trackers_are_compared_at_the_same_frame(page):
 
 def test_a_bad_path_is_one_sentence_in_the_page(page):
     button(page, "Open another session").click()
-    page.get_by_label("Path of a file or folder").fill("/no/such/session")
+    page.get_by_label("Path of a file or folder").fill("sessions/none.mcap")
     button(page, "Open").click()
-    page.get_by_text("There is no file or folder /no/such/session").wait_for()
+    page.get_by_text("There is no file or folder").wait_for()
+    page.get_by_label("Path of a file or folder").fill("/etc/hosts")
+    button(page, "Open").click()
+    page.get_by_text("/etc/hosts is in none of the folders that this page may open").wait_for()
     page.screenshot(path=ARTEFACTS / "bad-path.png")
     assert os.linesep + "Traceback" not in page.content()

@@ -5,7 +5,7 @@ import asyncio
 import numpy as np
 import pytest
 
-import app.controller
+import app.work
 from app.lane import Lane
 from app.state import COLOURS
 from app.views.costs import Costs
@@ -65,14 +65,14 @@ def test_lanes_with_the_same_settings_track_the_same(compared, act):
 
 def test_a_frame_that_one_lane_cannot_track_is_in_none(compared, act, monkeypatch):
     state, controller = compared
-    real = app.controller.track_frame
+    real = app.work.track_frame
 
     def broken(tracking, before, frame, *, record):
         if tracking.tracker == state.lanes[1].tracker:
             raise StartError("This one cannot.")
         return real(tracking, before, frame, record=record)
 
-    monkeypatch.setattr(app.controller, "track_frame", broken)
+    monkeypatch.setattr(app.work, "track_frame", broken)
     act(controller.step)
     assert (state.error, state.frame, state.busy) == ("This one cannot.", 0, False)
     assert tracked(state) == [[0], [0]]

@@ -5,7 +5,7 @@ import asyncio
 import numpy as np
 import pytest
 
-import app.controller
+import app.work
 from app.views.depth import depth_jpeg
 from app.views.scenes import SCENES, view_of
 from spf.render import Skeleton, ViewCamera
@@ -126,7 +126,7 @@ def test_an_unexpected_error_is_a_sentence_in_the_page_and_a_traceback_in_the_lo
     def broken(*_args, **_kwargs):
         raise RuntimeError("the moon is full")
 
-    monkeypatch.setattr(app.controller, "track_frame", broken)
+    monkeypatch.setattr(app.work, "track_frame", broken)
     act(controller.step)
     assert "the moon is full" in state.error
     assert "Traceback" not in state.error

@@ -147,6 +147,35 @@ def test_running_again_can_be_cancelled_and_what_it_has_done_is_kept(kept, shelf
     assert sorted(len(read_track(shelf.path(run.run) / "track.parquet")) for run in shelf.runs()) == [12, 24]
 
 
+@pytest.mark.parametrize("doing", ["the particles of the frame shown", "a re-run that needs those of the frame before"])
+def test_cancel_acts_while_particles_are_computed_again(kept, shelf, doing):
+    """They are looked for by themselves whenever the page is at rest: not again right after they were given up."""
+    (run,) = shelf.runs()
+    other, controller, reruns = new_page(shelf)
+    tasks = []
+    other.param.watch(lambda event: tasks.append(event.new) if event.new else None, "task")
+
+    async def scene():
+        await reruns.open(run.run, 19)
+        if "re-run" in doing:
+            running = asyncio.ensure_future(reruns.rerun(19))
+        while not other.task.startswith("Computing the particles"):
+            await asyncio.sleep(0.005)
+        reruns.cancel()
+        tasks.clear()
+        await asyncio.sleep(1.0)
+        if "re-run" in doing:
+            await running
+        assert (tasks, other.busy, other.last) == ([], False, 23)
+        controller.look(18)  # at another frame they are wanted again
+        while other.lane.entry(18) is None:
+            await asyncio.sleep(0.05)
+
+    asyncio.run(asyncio.wait_for(scene(), 120))
+    assert other.error == ""
+    controller.close()
+
+
 def test_a_run_is_compared_with_another_at_the_same_frame(kept, shelf):
     state, _, reruns = kept
     (run,) = shelf.runs()

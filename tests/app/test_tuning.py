@@ -1,6 +1,8 @@
 """What a setting does to the frame shown, presets as files, undo, and the page's address: without a browser."""
 
 import asyncio
+import os
+from urllib.parse import parse_qs, urlencode
 
 import numpy as np
 import pytest
@@ -8,18 +10,21 @@ import pytest
 from app.address import Address, Place, place_of
 from app.controller import Controller
 from app.lane import Lane
-from app.presets import Presets
 from app.preview import Previewer, _seen_again
 from app.reruns import Reruns
 from app.runner import Runner
-from app.server import bundled
+from app.server import bundled, open_shared
 from app.shelf import Shelf
 from app.state import State
 from app.views.again_card import AgainCard
 from app.views.difference import Difference
 from app.views.landscape import LandscapeCard
 from app.views.runs_card import RunsCard
+from app.views.settings_card import SettingsCard
 from spf.errors import SettingError
+from spf.presets import Presets
+from spf.render import ViewCamera
+from tests.sessions.ros_makers import make_ros1_bag
 
 
 async def weighed(state):
@@ -99,6 +104,50 @@ def test_a_preset_is_saved_as_a_file_and_read_back(tmp_path):
     assert lane.preset == "default"
 
 
+def test_a_preset_that_is_deleted_leaves_its_settings_to_who_uses_them(tmp_path):
+    presets = Presets(tmp_path)
+    lane = Lane(presets=presets)
+    lane.change("k", 2.5)
+    presets.save("spf", "mine", lane.settings)
+    lane.preset = "mine"
+    presets.delete("spf", "mine")
+    assert lane.differences == {}  # another page's, which knows nothing of it
+    lane.change("k", 4.0)
+    lane.back_to_preset()
+    assert lane.settings.k == 2.5
+    lane.without_preset()
+    assert (lane.preset, lane.settings.k, lane.differences) == ("default", 2.5, {"k": (Lane().settings.k, 2.5)})
+    for name in ("mine", "default", "../x"):
+        with pytest.raises(SettingError):
+            presets.delete("spf", name)
+
+
+def test_a_preset_is_deleted_in_the_page_with_two_clicks(tmp_path):
+    state, presets = State(), Presets(tmp_path)
+    state.lane.presets = presets
+    card = SettingsCard(state, presets)
+    assert not card._delete.visible
+    state.change("k", 2.5)
+    card._name.value = "mine"
+    card._save(None)
+    assert card._delete.visible
+    card._on_delete(None)
+    assert presets.names("spf")[-1] == "mine"
+    card._on_delete(None)
+    assert "mine" not in presets.names("spf")
+    assert (state.lane.preset, state.lane.settings.k, card._delete.visible, state.error) == ("default", 2.5, False, "")
+
+
+def test_a_damaged_preset_is_not_taken(tmp_path):
+    state, presets = State(), Presets(tmp_path)
+    state.lane.presets = presets
+    (tmp_path / "odd.spf.json").write_text("{")
+    card = SettingsCard(state, presets)
+    card._preset.value = "odd"
+    assert "damaged" in state.error
+    assert (state.lane.preset, card._preset.value) == ("default", "default")
+
+
 @pytest.mark.parametrize("name", ["", "default", "../up", "a/b", "taken"])
 def test_no_preset_is_written_over_or_outside(tmp_path, name):
     presets = Presets(tmp_path)
@@ -132,8 +181,11 @@ def test_changes_are_undone_one_by_one_and_a_dragged_slider_is_one(monkeypatch):
 
 def test_an_address_is_read_and_what_is_odd_in_it_left_out():
     whole = place_of({"session": "a", "run": "x,y", "frame": 7, "view": "compare", "eye": "0.1,0.2,2"})
-    assert whole == Place("a", "", ("x", "y"), 7, "compare", (0.1, 0.2, 2.0))
-    assert place_of({"frame": "-3", "view": "upside-down", "eye": "east"}) == Place()
+    assert whole[:-1] == Place("a", "", ("x", "y"), 7, "compare", (0.1, 0.2, 2.0))[:-1]
+    mistyped = {"tab": "moon", "picked": "x,-2", "layers": "hand,foot", "pan": "1", "stay": "0,0,0,0,-1", "across": "z"}
+    said = place_of({"frame": "-3", "view": "upside-down", "eye": "east"} | mistyped)
+    assert said == Place(look=place_of({}).look)
+    State().look.param.update(**said.look)
 
 
 def test_an_address_opened_elsewhere_shows_the_same(page, sample, act, tmp_path):
@@ -143,13 +195,42 @@ def test_an_address_opened_elsewhere_shows_the_same(page, sample, act, tmp_path)
     address = Address(state, controller, Reruns(controller, shelf), samples)
     act(lambda: address.go(Place("open-close", frame=12)))
     state.orbit(0.5, 0.0, 1.0)
+    anchor = ViewCamera((0.01, 0.02, 0.43), 0.44, 0.26)
+    looks = {
+        "tab": "scene",
+        "selected": (1, 3),
+        "layers": [],
+        "colouring": "cost",
+        "pan": (0.01, -0.02),
+        "anchor": anchor,
+    }
+    looks |= {"across": 7, "upwards": 2, "densities": ["g"]}
+    state.look.param.update(**looks)
     query = address.query()
     assert (query["session"], query["frame"], "run" in query) == ("open-close", 12, False)
     other = State()
     elsewhere = Controller(other, Runner())
     act(lambda: Address(other, elsewhere, Reruns(elsewhere, shelf), samples).go(place_of(query)))
     assert (other.session.name, other.frame, other.azimuth) == ("open-close", 12, 0.5)
+    assert {name: getattr(other.look, name) for name in looks} == looks
     elsewhere.close()
+
+
+def test_a_session_of_which_something_is_chosen_opens_from_the_address(page, act, tmp_path, monkeypatch):
+    monkeypatch.setenv("SPF_SESSIONS", str(tmp_path))
+    made = make_ros1_bag(tmp_path / "two topics.bag", np.random.default_rng(3))
+    state, controller = page
+    controller.opener = open_shared
+    address = Address(state, controller, Reruns(controller, Shelf(tmp_path / "runs")), bundled())
+    uri = f"{made.path}?topic=/head/depth/image_raw&unit=0.001"
+    for session in (uri, parse_qs(urlencode({"session": uri}))["session"][0]):
+        act(lambda session=session: address.go(place_of({"session": session})))
+        assert state.error == ""
+        assert str(state.session.uri) == address.query()["session"] == uri
+    before = state.session
+    os.utime(made.path, ns=(1, 1))
+    act(lambda: controller.open(uri))
+    assert state.session is not before  # the file has changed
 
 
 def test_an_address_of_a_run_that_is_gone_says_so_and_shows_its_session(page, act, tmp_path):

@@ -11,9 +11,11 @@ import pytest
 
 from spf import __version__
 from spf.cli import execute
+from spf.presets import Presets
 from spf.runs import read_run
 from spf.sessions import MCAPWriter, Note, open_session, write_session
 from spf.synthetic import SyntheticSettings, synthesise
+from spf.trackers import make_settings
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +50,22 @@ def test_info(made, capsys):
     assert 0.2 < facts["depth_m"][1] < 0.6
     assert execute(["info", str(made)]) == 0
     assert "320, 240" in capsys.readouterr().out
+
+
+def test_a_preset_saved_in_the_page_is_tracked_with_by_name_and_by_file(made, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("SPF_PRESETS", str(tmp_path))
+    Presets().save("smd", "my hand", make_settings("smd", "default", {"k": "2.5"}))
+    file = str(tmp_path / "my hand.smd.json")
+    for number, preset in enumerate(("my hand", file)):
+        options = ["--tracker", "smd", "--preset", preset, "--init", "truth", "--frames", "0:3", "--set", "mu=0.03"]
+        assert execute(["track", str(made), "-o", str(tmp_path / f"run{number}"), *options]) == 0
+        plan = read_run(tmp_path / f"run{number}").plan
+        assert (plan.preset, plan.settings.k, plan.settings.mu) == ("my hand", 2.5, 0.03)
+    capsys.readouterr()
+    for options, says in ((["--preset", file], "of the tracker smd"), (["--preset", "none"], "There is no preset 'none'"),
+                          (["--preset", str(tmp_path / "none.json")], "cannot be read")):  # fmt: skip
+        assert execute(["track", str(made), "-o", str(tmp_path / "x"), "--init", "truth", *options]) != 0
+        assert says in " ".join(capsys.readouterr().err.split())
 
 
 def test_synth_and_convert(tmp_path, capsys):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 
+import h5py
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -212,6 +213,22 @@ def test_arrays(tmp_path, rng, maker):
         np.testing.assert_array_equal(session[2].truth.joints, made.joints[2])
         np.testing.assert_allclose(session.times, np.arange(4) / 60, atol=1e-9)
         assert any("4×48×64 uint16" in line for line in session.contents)
+
+
+@pytest.mark.parametrize("how", ["external", "virtual"])
+def test_arrays_that_lie_in_other_files_are_refused(tmp_path, how):
+    """An upload could read any file of the server so."""
+    secret, path = tmp_path / "secret", tmp_path / "take.h5"
+    secret.write_bytes(bytes(2 * 48 * 64 * 2))
+    with h5py.File(path, "w") as file:
+        if how == "external":
+            file.create_dataset("depth", (2, 48, 64), "u2", external=[(str(secret), 0, h5py.h5f.UNLIMITED)])
+        else:
+            layout = h5py.VirtualLayout((2, 48, 64), "u2")
+            layout[:] = h5py.VirtualSource(str(secret), "depth", (2, 48, 64))
+            file.create_virtual_dataset("depth", layout)
+    with pytest.raises(SessionError, match="lie in other files"):
+        open_session(path)
 
 
 def test_compressed_and_single_arrays(tmp_path, rng):

@@ -95,6 +95,7 @@ export function render({ model, el }) {
     canvas.style.height = `${h}px`;
     canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio);
     const c = canvas.getContext('2d');
+    if (!model.count) return;  // no session
     c.scale(ratio, ratio); c.font = '11px Roboto, sans-serif'; c.lineJoin = 'round';
     const cell = width() / Math.max(model.count, 1), bars = CHART + GAP;
     const block = (from, to, y, height, colour, least = 1) =>
