@@ -17,7 +17,7 @@ from typing import Any
 import numba
 import numpy as np
 
-__all__ = ["allocating", "index", "kernel", "part", "strict_kernel"]
+__all__ = ["allocating", "index", "kernel", "part", "strict_kernel", "strict_part"]
 
 
 def _cache_of(sources: Path) -> Path:
@@ -39,11 +39,16 @@ allocating: Any = _compile(**_FAST)
 #: A kernel that works in the arrays that it is given.
 kernel: Any = _compile(**_FAST, _nrt=False)
 
-#: A part of kernels: compiled into each of them.
+#: A part of kernels: compiled into each of them. Whatever a kernel calls has to be one, even what Python calls as well:
+#: of two compiled copies of a function, which may round otherwise, a process uses the one that it met first, and that
+#: is another one where kernels are compiled than where they are loaded.
 part: Any = _compile(**_FAST, _nrt=False, forceinline=True)
 
 #: A kernel that keeps to IEEE arithmetic, because infinities or NaN may come in.
 strict_kernel: Any = _compile(**_STRICT, _nrt=False)
+
+#: A part of kernels that keeps to it.
+strict_part: Any = _compile(**_STRICT, _nrt=False, forceinline=True)
 
 #: An index that is not negative: numba does not look whether it counts from the end.
 index: Any = np.uint32

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.kernels.collision_term import collision_term
-from spf.kernels.compiling import kernel
+from spf.kernels.compiling import part
 from spf.kernels.cost_inputs import CostWeights, ObservationArrays, Spheres, Workspace, allocate
 from spf.kernels.coverage_term import coverage_term
 from spf.kernels.depth_term import depth_term
@@ -25,7 +25,7 @@ __all__ = ["CostWeights", "ObservationArrays", "Spheres", "Workspace", "allocate
 Array = NDArray[np.float64]
 
 
-@kernel
+@part
 def cost_products(
     skeleton: Skeleton, surface: Skin, spheres: Spheres, obs: ObservationArrays, weights: CostWeights,
     prior: Array, prior_precision: Array, pose: Array, reference: Array,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.kernels.collision_term import place_spheres, touches
-from spf.kernels.compiling import index, kernel, part
+from spf.kernels.compiling import index, part
 from spf.kernels.cost_inputs import HAND, LABEL, NORMAL, UNKNOWN, CostWeights, ObservationArrays, Spheres, Workspace
 from spf.kernels.depth_term import pixel_of
 from spf.kernels.kinematics import Skeleton, pose_bones
@@ -23,7 +23,7 @@ __all__ = ["gauss_newton_diagonal"]
 Array = NDArray[np.float64]
 
 
-@kernel
+@part
 def gauss_newton_diagonal(
     skeleton: Skeleton, surface: Skin, spheres: Spheres, obs: ObservationArrays, weights: CostWeights,
     prior_precision: Array, pose: Array, reference: Array,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import allocating, index, kernel, part
+from spf.kernels.compiling import allocating, index, part
 from spf.kernels.cost_inputs import NORMAL, ObservationArrays
 from spf.kernels.golden import beyond_wrist
 from spf.kernels.kinematics import Chain, Skeleton, pose_bones
@@ -102,7 +102,7 @@ def visible_vertices(
     return count
 
 
-@kernel
+@part
 def see(
     skeleton: Skeleton, surface: Skin, proxy: Skin, proxy_faces: NDArray[np.int32], obs: ObservationArrays,
     pose: Array, reference: Array, zbuffer: bool, chain: Chain, sight: Sight,
@@ -138,7 +138,7 @@ def keep_first(sight: Sight, count: int, order: NDArray[np.int32], most: int) ->
     return kept
 
 
-@kernel
+@part
 def match_pixels(
     sight: Sight, count: int, obs: ObservationArrays, chain: Chain, pose: Array,
     pixels: NDArray[np.int32], radius: float, matches: NDArray[np.int32],

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.kernels.compiling import allocating, index, kernel, part, strict_kernel
+from spf.kernels.compiling import allocating, index, kernel, part, strict_part
 from spf.kernels.cost import CostWeights, ObservationArrays, Spheres, Workspace, cost_products
 from spf.kernels.curvature import gauss_newton_diagonal
 from spf.kernels.kinematics import Skeleton
@@ -55,7 +55,7 @@ class SmdParameters(NamedTuple):
     zbuffer: bool
 
 
-@strict_kernel
+@strict_part
 def smd_update(
     pose: Array, step: Array, trace: Array, gradient: Array, product: Array, meta_step: float, decay: float,
     first: bool, low: Array, high: Array, bound: Array, limits: Array,

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -323,3 +324,18 @@ def test_a_session_without_frames_is_told(tmp_path):
     MCAPWriter(tmp_path / "s.mcap", camera=CAMERA).close()
     with pytest.raises(SessionError, match=r"s\.mcap holds no frame"):
         open_session(tmp_path / "s.mcap")
+
+
+def test_a_long_recording_keeps_only_its_index_in_memory(tmp_path):
+    raw = np.zeros((CAMERA.height, CAMERA.width), np.uint16)
+    with MCAPWriter(tmp_path / "long.mcap", camera=CAMERA, start_time_ns=10**18) as writer:
+        for number in range(100):
+            writer.write_raw(number * 33_333_333, raw)
+        tracemalloc.start()
+        try:
+            for number in range(100, 1100):
+                writer.write_raw(number * 33_333_333, raw)
+            kept, _ = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+    assert kept < 1000 * 800  # an entry of the file's index: where the frame lies, which is written when it is closed
