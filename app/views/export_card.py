@@ -57,10 +57,11 @@ class ExportCard:
         """Make a file of what the page shows and hand it over."""
         if self._state.busy:
             return
-        async with self._controller.doing(kind.task):
-            wanted = wanted_of(self._state, self._folder)
-            name, content = await self._controller.run(exported(wanted, kind.ending, self._renderer))
-            self.download.hand_over(name, content)
+        async with self._controller.doing(kind.task) as wanted:
+            asked = wanted_of(self._state, self._folder)
+            name, content = await self._controller.run(exported(asked, kind.ending, self._renderer))
+            if wanted():
+                self.download.hand_over(name, content)
 
     def _follow(self, *_events: Any) -> None:
         state = self._state

@@ -122,7 +122,7 @@ def test_the_command_tracks_a_replay_live(tmp_path, capsys):
     write_session(session, tmp_path / "s.mcap")
     write_hand_shape(HandShape.from_dict(session.hand_shape, "it"), tmp_path / "hand.json")
     uri, run = f"replay:{tmp_path / 's.mcap'}?loop=1&speed=0.2", tmp_path / "run"
-    arguments = ["track", uri, "-o", str(run), "--hand", str(tmp_path / "hand.json"), "--seconds", "45", "--set", "n=2"]
+    arguments = ["track", uri, "-o", str(run), "--hand", str(tmp_path / "hand.json"), "--seconds", "25", "--set", "n=2"]
     assert execute([*arguments, "--json"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert lines[-1]["not_recorded"] == 0
