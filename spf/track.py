@@ -38,10 +38,7 @@ _PATIENCE = 3  # bad frames in a row that make a loss
 _FIRST_EFFORT = 3.0
 _FRAME = 1.0 / 30.0  # s
 _STRANGE = 0.3  # golden energy that an estimate is charged by the network, over which it is doubted
-_ELSEWHERE, _CLEARLY = (
-    0.25,
-    0.05,
-)  # m within which a doubted hand is looked for, and golden energy that it must be better by
+_CLEARLY = 0.05  # golden energy that a hand elsewhere must be better by than a doubted one
 _NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a hand is looked for in, and how much it grows a frame
 
 
@@ -174,9 +171,8 @@ def track_frame(
     new, info = _stepped(tracking, state, looked.observation, rng, record)
     doubts = _doubts(tracking, state, new, info, looked.seen)
     observation = looked.observation
-    if (
-        doubts and doubts & (doubts - 1) == 0
-    ):  # the first, the second, the fourth …: a glance takes several frames' time
+    # A glance takes several frames' time: it is taken at the first doubt in a row, the second, the fourth, …
+    if doubts and doubts & (doubts - 1) == 0:
         elsewhere = _glanced(tracking, state, new, info, looked.seen, frame, rng)
         if elsewhere is not None:
             state, doubts = elsewhere, 0

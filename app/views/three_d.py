@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 import panel as pn
@@ -144,41 +144,41 @@ class ThreeD:
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
 
     async def _draw(self, *, sharp: bool) -> None:
+        """Have each picture drawn as soon as its scene is made, while the next scene is; send all in one message."""
         state, lanes, asked = self._state, self._lanes(), self._asked
         entries = {name: entry for name, lane in lanes.items() if (entry := lane.entry(state.frame)) is not None}
-        scenes = await self._scenes(entries)
+        with_hand = [entry for entry in entries.values() if entry.result.info is not None and entry.seen is not None]
+        if with_hand:
+            self._view = view_of(with_hand, state)
+        size, quality = (self._sizes[1], 92) if sharp else (self._sizes[0], 80)
+        futures = {}
+        async for name, scene in self._scenes(entries):
+            if scene is not None:
+                assert self._view is not None
+                picture = self._renderer.submit(scene, self._view, size, encoding="jpeg", quality=quality, smooth=sharp)
+                futures[name] = asyncio.wrap_future(picture)
         for name, lane in lanes.items():
-            if name not in scenes:
+            if name not in futures:
                 self.panes[name].param.update(image=b"", hint=self._hint(lane))
-        if not scenes:
+        if not futures:
             self._seen = asked
             return
-        view = self._view = view_of((entries[name] for name in scenes), state)
-        size, quality = (self._sizes[1], 92) if sharp else (self._sizes[0], 80)
-        futures = {
-            name: asyncio.wrap_future(
-                self._renderer.submit(scene, view, size, encoding="jpeg", quality=quality, smooth=sharp)
-            )
-            for name, scene in scenes.items()
-        }
         pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
         self._awaited, self._sent = len(pictures), asked
         with pn.io.hold():
-            for name, picture in pictures.items():
-                self.panes[name].image = picture
+            for name, content in pictures.items():
+                self.panes[name].image = content
 
-    async def _scenes(self, entries: dict[str, Entry]) -> dict[str, Scene]:
-        """The scenes of entries, made beside the event loop unless they were drawn last."""
+    async def _scenes(self, entries: dict[str, Entry]) -> AsyncIterator[tuple[str, Scene | None]]:
+        """The scenes of entries, one after the other, made beside the event loop unless they were drawn last."""
         loop, shown = asyncio.get_running_loop(), self._state.look.shown
-        made: dict[str, tuple[Entry, Shown, Scene | None]] = {}
+        self._made = {name: made for name, made in self._made.items() if name in entries}
         for name, entry in entries.items():
             last = self._made.get(name)
-            if last is not None and last[0] is entry and last[1] == shown:
-                made[name] = last
-            else:
-                made[name] = entry, shown, await loop.run_in_executor(None, self._scene, name, entry, shown)
-        self._made = made
-        return {name: scene for name, (_, _, scene) in made.items() if scene is not None}
+            if last is None or last[0] is not entry or last[1] != shown:
+                last = entry, shown, await loop.run_in_executor(None, self._scene, name, entry, shown)
+                self._made[name] = last
+            yield name, last[2]
 
     def _hint(self, lane: Lane) -> str:
         """What is said in place of a picture."""

@@ -36,6 +36,7 @@ class Kind(NamedTuple):
         away: whether the hand leaves in the middle and comes back.
         turned: whether the palm is turned anyhow, and tipped and rolled far more than a hand held up is.
         every: whether the numbers go through all pairs of a motion and one of all sensors.
+        told: whether the start is told the side, because nothing else says which of two hands is meant.
     """
 
     speed_mm: float
@@ -45,6 +46,7 @@ class Kind(NamedTuple):
     away: bool = False
     turned: bool = False
     every: bool = False
+    told: bool = False
 
 
 KINDS: dict[str, Kind] = {
@@ -56,7 +58,7 @@ KINDS: dict[str, Kind] = {
     "body": Kind(9.0, "a person behind the hand", clutter="body"),
     "table": Kind(9.0, "over a table, seen from above", clutter="table"),
     "face": Kind(9.0, "a face beside and behind the hand", clutter="face"),
-    "second_hand": Kind(9.0, "another hand beside it", clutter="second_hand"),
+    "second_hand": Kind(9.0, "another hand beside it", clutter="second_hand", told=True),
     "away": Kind(9.0, "the hand leaves the view and comes back", away=True),
     "every": Kind(9.0, "every motion with every sensor, 45 in a row", every=True),
 }

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.holds.labels import as_labelled, hand_of_labels, true_side
-from benchmarks.holds.sessions import Source, open_source
+from benchmarks.holds.sessions import KINDS, Source, open_source
 from spf.evaluate import agreement_with_depth
 from spf.evaluate.contradictions import CONTRADICTED, label_energy
 from spf.evaluate.floor import floor_of
@@ -47,7 +47,7 @@ class Asked(NamedTuple):
 def held(source: Source, asked: Asked) -> list[dict[str, Any]]:
     """Start, track with each number of particles, and measure, ready for JSON; one result a number of particles.
 
-    Nothing is told to the start but the frames: neither the side of the hand nor its size.
+    Nothing is told to the start but the frames: neither the size of the hand nor, but for kinds that say so, its side.
 
     Raises:
         SpfError: no start was found, or a frame cannot be read.
@@ -56,7 +56,8 @@ def held(source: Source, asked: Asked) -> list[dict[str, Any]]:
     frames = SessionFrames(session, 0, min(source.frames, len(session)))
     began = time.perf_counter()
     if asked.init == "auto":
-        start = find_start(frames, np.random.default_rng([source.seed, 1]))
+        told = source.synthetic and KINDS[source.kind].told
+        start = find_start(frames, np.random.default_rng([source.seed, 1]), side=true_side(session) if told else None)
     else:
         start = prepare(session, init=asked.init, seed=source.seed, last=len(frames))
     shared = {

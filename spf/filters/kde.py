@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.spatial.distance import cdist
 
 from spf.filters.particles import log_sum_exp
@@ -15,6 +16,7 @@ from spf.settings import Settings, setting
 __all__ = [
     "WINDOW_RULES",
     "CorrectionSettings",
+    "adaptive_window",
     "correct",
     "log_correction",
     "log_density",
@@ -25,6 +27,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 _LEAST_WINDOW = 1e-6  # of samples that all lie in one place
+_WINDOWS = 0.01, 100.0  # that the adaptive rule chooses from
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,9 +44,9 @@ class CorrectionSettings(Settings):
     )
     window_rule: str = setting(
         "fixed",
-        "how the window is chosen: h itself, the paper's (29), or the d-dimensional rule",
+        "how the window is chosen: h itself, the paper's (29), the d-dimensional rule, or as wide as each frame's optima need",
         group="Filter",
-        choices=("fixed", "paper", "silverman"),
+        choices=("fixed", "paper", "silverman", "adaptive"),
     )
     correction: bool = setting(True, "correct the weights of optimised samples (32)", group="Filter")
     weighting: str = setting(
@@ -64,7 +67,9 @@ def correct(predicted: Array, optimised: Array, scale: Array, settings: Correcti
     """
     white, white_optimised = predicted / scale, optimised / scale
     window = settings.h
-    if settings.window_rule != "fixed":
+    if settings.window_rule == "adaptive":
+        window = adaptive_window(white, white_optimised)
+    elif settings.window_rule != "fixed":
         window = max(WINDOW_RULES[settings.window_rule](white), _LEAST_WINDOW)
     if not settings.correction:
         return window, np.zeros(len(predicted) + len(optimised))
@@ -138,6 +143,29 @@ def silverman_window(samples: Array) -> float:
     return float(
         (4.0 / (dimensions + 2)) ** (1.0 / (dimensions + 4)) * _spread(samples) * count ** (-1.0 / (dimensions + 4))
     )
+
+
+def adaptive_window(predicted: Array, optimised: Array) -> float:
+    """Return the smallest window that keeps half of the optimised samples' weight: the mean of their log c (32) is log ½.
+
+    It grows with how far the optima lie from all that was predicted, so that a fast motion is not taken for an impossible
+    one, and no wider than that, so that f still tells near samples from far ones. Not from the paper.
+
+    Args:
+        predicted, optimised: (N, d), (N⁺, d), whitened.
+
+    Returns:
+        h, between 0.01 and 100.
+    """
+    count = len(predicted)
+
+    def excess(log_window: float) -> float:
+        return float(log_correction(predicted, optimised, math.exp(log_window))[count:].mean()) - math.log(0.5)
+
+    low, high = map(math.log, _WINDOWS)
+    if excess(low) >= 0.0 or excess(high) <= 0.0:
+        return _WINDOWS[0] if excess(low) >= 0.0 else _WINDOWS[1]
+    return math.exp(brentq(excess, low, high, xtol=1e-3))
 
 
 #: Rules that find the window from the predicted samples.

@@ -8,16 +8,21 @@ from app.controller import Controller
 from app.runner import Runner
 from app.server import bundled
 from app.state import State
+from tests.app.test_browser import serving
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def shelf(tmp_path_factory):
-    """The folder of a server's runs; they and its presets go where nobody's are."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("runs")
-        patch.setenv("SPF_RUNS", str(folder))
-        patch.setenv("SPF_PRESETS", str(tmp_path_factory.mktemp("presets")))
-        yield folder
+    """The folder of the runs of the server that the browser tests share."""
+    return tmp_path_factory.mktemp("runs")
+
+
+@pytest.fixture(scope="session")
+def server(tmp_path_factory, shelf):
+    """The address of a server that the browser tests share, and its log so far."""
+    log = tmp_path_factory.mktemp("server") / "log"
+    with serving(log, shelf) as address:
+        yield address, log
 
 
 @pytest.fixture

@@ -32,14 +32,17 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this ma
 
 
 @contextmanager
-def serving(log, *options, **variables):
-    """Serve the dashboard with options of ``panel serve`` and environment variables; yields its address."""
+def serving(log, runs, *options, **variables):
+    """Serve the dashboard with options of ``panel serve`` and environment variables; yields its address.
+
+    Its runs and its presets go into a folder of the test's, where nobody's are.
+    """
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     with log.open("w") as file:
         command = [sys.executable, "-m", "panel", "serve", "app", "--port", str(port), *options]
-        environment = os.environ | variables
+        environment = os.environ | {"SPF_RUNS": str(runs), "SPF_PRESETS": f"{runs}-presets"} | variables
         process = subprocess.Popen(command, cwd=REPOSITORY, stdout=file, stderr=subprocess.STDOUT, env=environment)
         try:
             _wait_for(f"http://localhost:{port}/app", process)
@@ -47,14 +50,6 @@ def serving(log, *options, **variables):
         finally:
             process.terminate()
             process.wait(60)
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory, shelf):
-    """The address of a server, and its log so far."""
-    log = tmp_path_factory.mktemp("server") / "log"
-    with serving(log) as address:
-        yield address, log
 
 
 def _wait_for(address, process):
@@ -72,7 +67,7 @@ def _wait_for(address, process):
 def visiting(address, log):
     """A page; at the end, it has asked no other host for anything, and neither side has complained."""
     ARTEFACTS.mkdir(exist_ok=True)
-    elsewhere, complaints = [], []
+    elsewhere, complaints, before = [], [], len(log.read_text())
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
         page = browser.new_page(viewport={"width": 1440, "height": 900})
@@ -90,7 +85,7 @@ def visiting(address, log):
         browser.close()
     assert elsewhere == []
     assert complaints == []
-    assert not [line for line in log.read_text().splitlines() if TROUBLE.search(line)]
+    assert not [line for line in log.read_text()[before:].splitlines() if TROUBLE.search(line)]
 
 
 @pytest.fixture

@@ -5,19 +5,18 @@ from axe_playwright_python.sync_playwright import Axe
 
 from app.views.help import STAGES
 from app.views.tour import STEPS
-from tests.app.test_browser import (  # the fixtures are used by name
+from tests.app.test_browser import (  # the fixture is used by name
     ARTEFACTS,
     button,
     page,
     picture,
     pixels,
-    server,
     settled,
     start_from_truth,
 )
 from tests.app.test_browser import pytestmark as pytestmark
 
-__all__ = ["page", "server"]
+__all__ = ["page"]
 
 
 def serious(page):

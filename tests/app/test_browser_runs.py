@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.app.test_browser import (  # noqa: F401 - fixtures
+from tests.app.test_browser import (  # noqa: F401 - the fixture
     ARTEFACTS,
     CHROMIUM,
     at_frame,
@@ -12,12 +12,26 @@ from tests.app.test_browser import (  # noqa: F401 - fixtures
     columns,
     nudge,
     page,
-    server,
+    serving,
     settled,
     start_from_truth,
 )
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory):
+    """The folder of a server's runs that no other test adds to."""
+    return tmp_path_factory.mktemp("own-runs")
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory, shelf):
+    """The address of a server of the module's own, and its log so far."""
+    log = tmp_path_factory.mktemp("own-server") / "log"
+    with serving(log, shelf) as address:
+        yield address, log
 
 
 def kept(shelf):

@@ -4,7 +4,7 @@ import re
 
 from playwright.sync_api import expect
 
-from tests.app.test_browser import (  # the fixtures are used by name
+from tests.app.test_browser import (  # the fixture is used by name
     ARTEFACTS,
     at_frame,
     button,
@@ -12,14 +12,13 @@ from tests.app.test_browser import (  # the fixtures are used by name
     page,
     picture,
     pixels,
-    server,
     settled,
     start_from_truth,
 )
 from tests.app.test_browser import pytestmark as pytestmark
-from tests.app.test_browser_runs import count_of_kept, kept
+from tests.app.test_browser_runs import count_of_kept, kept, server, shelf
 
-__all__ = ["page", "server"]
+__all__ = ["page", "server", "shelf"]
 
 
 def at_rest(page):

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from tests.app.test_browser import (  # noqa: F401 - fixtures
+from tests.app.test_browser import (  # noqa: F401 - the fixture
     ARTEFACTS,
     CHROMIUM,
     at_frame,
@@ -14,7 +14,6 @@ from tests.app.test_browser import (  # noqa: F401 - fixtures
     nudge,
     page,
     picture,
-    server,
     settled,
     start_from_truth,
 )

@@ -3,10 +3,10 @@
 import re
 
 from spf.sessions import open_session
-from tests.app.test_browser import ARTEFACTS, REPOSITORY, button, page, picture, server  # the fixtures are used by name
+from tests.app.test_browser import ARTEFACTS, REPOSITORY, button, page, picture  # the fixture is used by name
 from tests.app.test_browser import pytestmark as pytestmark
 
-__all__ = ["page", "server"]
+__all__ = ["page"]
 
 
 def test_a_live_sensor_is_tracked_recorded_and_opened(page):

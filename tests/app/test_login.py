@@ -29,7 +29,7 @@ def guarded(tmp_path_factory, shelf):
         "--logout-template",
         "app/logout.html",
     )
-    with serving(folder / "log", *options, PANEL_COOKIE_SECRET="only-of-this-test") as address:
+    with serving(folder / "log", shelf, *options, PANEL_COOKIE_SECRET="only-of-this-test") as address:
         yield address, folder / "log"
 
 

@@ -42,7 +42,7 @@ def recordings(tmp_path_factory):
 def room(tmp_path_factory, shelf, recordings):
     """The address of a server that may open them, and its log."""
     log = tmp_path_factory.mktemp("room") / "log"
-    with serving(log, SPF_SESSIONS=str(recordings)) as address:
+    with serving(log, shelf, SPF_SESSIONS=str(recordings)) as address:
         yield address, log
 
 
@@ -124,7 +124,7 @@ def test_without_opengl_everything_else_works_and_the_pictures_say_what_to_insta
         (tmp_path / name).touch()  # not a library: hides the real one
     hidden = {"LD_LIBRARY_PATH": str(tmp_path), "__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path), "DISPLAY": ""}
     log = tmp_path / "log"
-    with serving(log, **hidden) as address, visiting(address, log) as page:
+    with serving(log, shelf, **hidden) as address, visiting(address, log) as page:
         picture(page, "Depth image").wait_for()
         page.get_by_label("First pose").click()
         page.locator("li", has_text="Take it from the truth").click()

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from tests.app.test_browser import (  # the fixtures are used by name
+from tests.app.test_browser import (  # the fixture is used by name
     ARTEFACTS,
     at_frame,
     button,
@@ -14,13 +14,12 @@ from tests.app.test_browser import (  # the fixtures are used by name
     picture,
     pixels,
     plotted,
-    server,
     settled,
     start_from_truth,
 )
 from tests.app.test_browser import pytestmark as pytestmark
 
-__all__ = ["page", "server"]
+__all__ = ["page"]
 
 
 def visible(page, name):

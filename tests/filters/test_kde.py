@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import gaussian_kde
 
-from spf.filters.kde import log_correction, log_density, paper_window, silverman_window
+from spf.filters.kde import adaptive_window, log_correction, log_density, paper_window, silverman_window
 
 
 def test_the_density_is_scipys(rng: np.random.Generator) -> None:
@@ -52,3 +52,17 @@ def test_window_rules(count: int, rng: np.random.Generator) -> None:
     sigma = np.sqrt(np.trace(np.cov(samples.T)) / 4)
     assert paper_window(samples) == pytest.approx(1.06 * sigma * count**-0.2)
     assert silverman_window(samples) == pytest.approx((4 / 6) ** (1 / 8) * sigma * count ** (-1 / 8))
+
+
+def test_the_adaptive_window_keeps_half_of_the_optimised_weight_however_far_the_optima_lie():
+    predicted = np.random.default_rng(3).normal(size=(5, 26))
+    windows = []
+    for far in (0.5, 2.0, 8.0):
+        optimised = predicted * 0.3 + far
+        windows.append(adaptive_window(predicted, optimised))
+        log_c = log_correction(predicted, optimised, windows[-1])[len(predicted) :]
+        assert np.exp(log_c.mean()) == pytest.approx(0.5, abs=0.01)
+    assert windows == sorted(windows)
+    assert windows[2] > 3 * windows[0]
+    assert adaptive_window(predicted, predicted) == 0.01  # nothing has moved: any window will do
+    assert adaptive_window(predicted, predicted + 1e4) == 100.0
