@@ -90,7 +90,8 @@ def compare_trackers(
             first=first, last=last, progress=report,
         )  # fmt: skip
         for seed, start in comparison.starts.items():
-            warn(start.doubt and f"seed {seed}: {start.doubt}")
+            for sentence in (start.doubt, start.remark):
+                warn(sentence and f"seed {seed}: {sentence}")
         interrupted = False
         try:
             for so_far in compare(comparison, output, jobs=jobs or threads(), equal_time=equal_time, progress=report):
