@@ -163,8 +163,10 @@ def adaptive_window(predicted: Array, optimised: Array) -> float:
         return float(log_correction(predicted, optimised, math.exp(log_window))[count:].mean()) - math.log(0.5)
 
     low, high = map(math.log, _WINDOWS)
-    if excess(low) >= 0.0 or excess(high) <= 0.0:
-        return _WINDOWS[0] if excess(low) >= 0.0 else _WINDOWS[1]
+    if excess(low) >= 0.0:
+        return _WINDOWS[0]
+    if excess(high) <= 0.0:
+        return _WINDOWS[1]
     return math.exp(brentq(excess, low, high, xtol=1e-3))
 
 
