@@ -11,15 +11,16 @@ TABS = ("Overview", "What the filter thinks", "3-D scene")
 
 
 def looked_at(page, name):
-    """What axe-core finds in a page that has come to rest; a picture is kept of both sizes, where nothing is cut off."""
-    for width, height in ((1024, 768), (1440, 900)):
+    """What axe-core finds in a page that has come to rest, at both sizes; a picture of each is kept."""
+    found = {}
+    for width, height in ((1440, 900), (1024, 768)):
         page.set_viewport_size({"width": width, "height": height})
         settled(page)
         page.screenshot(path=ARTEFACTS / f"{name}-{width}.png")
         assert page.evaluate("document.documentElement.scrollWidth") <= width
-    if found := serious(page):
-        page.wait_for_timeout(3000)  # a table that is being drawn has no rows for a moment
-        found = serious(page)
+        if serious(page):
+            page.wait_for_timeout(3000)  # a table that is being drawn has no rows for a moment
+            found |= serious(page)
     return found
 
 
