@@ -1,4 +1,4 @@
-"""What a server does before the first page is asked for: compile the kernels and start the renderer."""
+"""What a server does before the first page is asked for: compile the kernels, start the renderer, keep order."""
 
 import asyncio
 from typing import Any
@@ -6,11 +6,13 @@ from typing import Any
 from tornado.ioloop import IOLoop
 from tornado.websocket import WebSocketClosedError
 
+from app.sending import keep_order
 from app.server import kernels, renderer
 
 
 def on_server_loaded(_server_context: Any) -> None:
-    """Begin both in the background."""
+    """Begin the first two in the background."""
+    keep_order()
     kernels()
     renderer()
     IOLoop.current().asyncio_loop.set_exception_handler(_tell)  # type: ignore[attr-defined]

@@ -56,18 +56,24 @@ class Follower(ABC):
             if self._waiting is None:
                 self._waiting = document.add_timeout_callback(self._draw, _PICTURES_FIRST)
         else:  # Bokeh's own models are changed under the document's lock, which asynchronous actions don't hold
-            document.add_next_tick_callback(self.draw)
+            document.add_next_tick_callback(self._draw)
 
     def _pictured(self, *_events: Any) -> None:
         document = pn.state.curdoc
         if self._waiting is not None and document is not None:
             document.remove_timeout_callback(self._waiting)
             self._waiting = None
-            document.add_next_tick_callback(self.draw)
+            document.add_next_tick_callback(self._draw)
 
     def _draw(self) -> None:
+        """Draw in one message, which keeps its place among those that Panel sends.
+
+        Without it Bokeh may overtake what Panel has to send later because the connection is busy, and so speak of plots
+        that the browser has not been sent yet.
+        """
         self._waiting = None
-        self.draw()
+        with pn.io.hold():
+            self.draw()
 
     def _catch_up(self, _event: Any) -> None:
         if self._is_behind and not self.state.task:
