@@ -1,27 +1,24 @@
-"""Bags whose messages lie in compressed chunks of one file: where they lie, and how a chunk is unpacked."""
+"""Bags whose messages lie in compressed chunks of one file: where they lie, and how they are read."""
 
 from __future__ import annotations
 
-import bz2
 import threading
-import zlib
 from abc import abstractmethod
 from array import array
 from collections import OrderedDict
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
-import lz4.frame
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 from spf.parallel import map_threads, threads
-from spf.sessions.bag import DAMAGE, LARGEST, Bag, Topic, damaged
+from spf.sessions.bag import DAMAGE, Bag, Topic, damaged
+from spf.sessions.bag_packed import Packed
 
-__all__ = ["OUTSIDE", "ChunkedBag", "Packed", "Places"]
+__all__ = ["OUTSIDE", "ChunkedBag", "Places"]
 
 OUTSIDE = -1  # instead of the offset of a chunk: the message lies outside chunks
 
@@ -79,68 +76,6 @@ class Places:
         return rows[np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))]
 
 
-class Packed(NamedTuple):
-    """The header of a chunk.
-
-    Attributes:
-        compression: ``""``, ``none``, ``zstd``, ``lz4`` or ``bz2``.
-        start: where its packed bytes begin in the file.
-        stored: how many they are.
-        size: bytes that they unpack to.
-        crc: of the unpacked bytes, 0 if it is not told.
-    """
-
-    compression: str
-    start: int
-    stored: int
-    size: int
-    crc: int = 0
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it is not compressed."""
-        return self.compression in ("", "none")
-
-    def unpack(self, file: BinaryIO) -> bytes:
-        """Unpack it, never into more than its header says.
-
-        Raises:
-            ValueError: it is not what the header says, or the header is absurd.
-        """
-        unpacked = self.unpack_first(file, self.size)
-        if len(unpacked) != self.size:
-            raise ValueError("a chunk smaller than its header says")
-        if self.crc and zlib.crc32(unpacked) != self.crc:
-            raise ValueError("a damaged chunk")
-        return unpacked
-
-    def unpack_first(self, file: BinaryIO, count: int) -> bytes:
-        """Unpack its first bytes, up to ``count``; nothing is checked but that the header is not absurd.
-
-        Raises:
-            ValueError: the header is absurd, or tells of fewer bytes than there are.
-        """
-        if self.size > LARGEST:
-            raise ValueError(f"a chunk of {self.size} bytes")
-        count = min(count, self.size)
-        file.seek(self.start)
-        data = file.read(min(self.stored, count) if self.is_plain else self.stored)
-        if self.is_plain:
-            return data
-        if self.compression == "zstd":
-            if zstandard.frame_content_size(data) > self.size:
-                raise ValueError("a chunk larger than its header says")
-            if count == self.size:
-                return zstandard.ZstdDecompressor().decompress(data, max_output_size=count)
-            with zstandard.ZstdDecompressor().stream_reader(data) as reader:
-                return reader.read(count)
-        if self.compression == "lz4":
-            return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=count)
-        if self.compression == "bz2":
-            return bz2.BZ2Decompressor().decompress(data, max_length=count)
-        raise ValueError(f"compression {self.compression}")
-
-
 class ChunkedBag(Bag):
     """A bag in one file; the last few chunks are kept unpacked.
 
@@ -174,7 +109,7 @@ class ChunkedBag(Bag):
         """Read the record at an offset of the file, of a message outside chunks."""
 
     @abstractmethod
-    def _message(self, data: bytes, offset: int, first: int | None = None) -> bytes:
+    def _message(self, data: bytes | memoryview, offset: int, first: int | None = None) -> bytes:
         """Return the message whose record begins at an offset of some bytes, or its first bytes.
 
         Raises:
@@ -232,8 +167,8 @@ class ChunkedBag(Bag):
                 if packed.is_plain:
                     heads = [self._head_at(file, packed.start + offset, size) for offset in offsets]
                 else:
-                    data = packed.unpack_first(file, max(offsets) + _AROUND + size)
-                    heads = [self._head_in(data, offset, size) for offset in offsets]
+                    first = packed.unpack_first(file, max(offsets) + _AROUND + size)
+                    heads = [self._head_in(first, offset, size) for offset in offsets]
                 if all(heads):
                     return heads
                 data = packed.unpack(file)  # a record that begins more than _AROUND before its message, or damage
@@ -245,7 +180,7 @@ class ChunkedBag(Bag):
         file.seek(position)
         return self._head_in(file.read(_AROUND + size), 0, size)
 
-    def _head_in(self, data: bytes, offset: int, size: int) -> bytes:
+    def _head_in(self, data: bytes | memoryview, offset: int, size: int) -> bytes:
         try:
             return self._message(data, offset, size)
         except DAMAGE:

@@ -19,7 +19,8 @@ from mcap.writer import MCAP0_MAGIC
 
 from spf.errors import SessionError
 from spf.sessions.bag import DAMAGE, damaged, unpack_message
-from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Packed, Places
+from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Places
+from spf.sessions.bag_packed import Packed
 from spf.sessions.progress import Report, silent
 
 __all__ = ["McapBag"]
@@ -152,7 +153,7 @@ class McapBag(ChunkedBag):
             raise ValueError("a record longer than the file")
         return head + file.read(size)
 
-    def _message(self, data: bytes, offset: int, first: int | None = None) -> bytes:
+    def _message(self, data: bytes | memoryview, offset: int, first: int | None = None) -> bytes:
         opcode, size = _RECORD.unpack_from(data, offset)
         if opcode != Opcode.MESSAGE or size < _MESSAGE.size:
             raise ValueError("no message")
@@ -160,7 +161,7 @@ class McapBag(ChunkedBag):
         end = end if first is None else min(start + first, end)
         if len(data) < end:
             raise ValueError("a message longer than its chunk")
-        return data[start:end]
+        return bytes(data[start:end])
 
     def read(self, topic: str, position: int) -> bytes:
         """Return a message."""

@@ -14,7 +14,8 @@ from typing import BinaryIO, NamedTuple
 import numpy as np
 
 from spf.sessions.bag import DAMAGE
-from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Packed, Places
+from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Places
+from spf.sessions.bag_packed import Packed
 from spf.sessions.progress import Report, silent
 
 __all__ = ["MAGIC", "Ros1Bag"]
@@ -54,10 +55,10 @@ def _fields(header: bytes) -> dict[str, bytes]:
     return found
 
 
-def _record_in(data: bytes, position: int) -> _Record:
+def _record_in(data: bytes | memoryview, position: int) -> _Record:
     """Read the header of the record at a position of an unpacked chunk; its data may go on behind the chunk's end."""
     (header_size,) = _U32.unpack_from(data, position)
-    fields = _fields(data[position + 4 : position + 4 + header_size])
+    fields = _fields(bytes(data[position + 4 : position + 4 + header_size]))
     (size,) = _U32.unpack_from(data, position + 4 + header_size)
     return _Record(fields, position + 8 + header_size, size)
 
@@ -163,7 +164,7 @@ class Ros1Bag(ChunkedBag):
     def _outside(self, file: BinaryIO, offset: int) -> bytes:
         raise ValueError("ROS 1 bags have no messages outside chunks")
 
-    def _message(self, data: bytes, offset: int, first: int | None = None) -> bytes:
+    def _message(self, data: bytes | memoryview, offset: int, first: int | None = None) -> bytes:
         record = _record_in(data, offset)
         while record.kind == _CONNECTION:  # some recorders let the index point at the connection before the message
             record = _record_in(data, record.start + record.size)
@@ -172,7 +173,7 @@ class Ros1Bag(ChunkedBag):
         end = record.start + (record.size if first is None else min(first, record.size))
         if end > len(data):
             raise ValueError("a message longer than its chunk")
-        return data[record.start : end]
+        return bytes(data[record.start : end])
 
 
 def _take_index(file: BinaryIO, record: _Record, chunk: int, found: dict[int, Places]) -> None:
