@@ -20,7 +20,7 @@ from spf.sessions.bag_sqlite import SqliteBag, is_sqlite_bag, topic_names
 from spf.sessions.choice import Choice
 from spf.sessions.files import list_files
 from spf.sessions.mcap_index import has_magic
-from spf.sessions.progress import Report, silent
+from spf.sessions.progress import Report
 from spf.sessions.ros_session import open_ros
 from spf.sessions.session import Session
 
@@ -118,7 +118,7 @@ def is_realsense(path: Path) -> bool:
         return b"topic=/device_" in file.read(_HEAD)
 
 
-def open_ros1(path: Path, choice: Choice, uri: str, report: Report = silent) -> Session:
+def open_ros1(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a ROS 1 bag.
 
     Raises:
@@ -127,7 +127,7 @@ def open_ros1(path: Path, choice: Choice, uri: str, report: Report = silent) -> 
     return open_ros(Ros1Bag(path, report), path.stem, "ros1-bag", uri, choice, report)
 
 
-def open_ros2(path: Path, choice: Choice, uri: str, report: Report = silent) -> Session:
+def open_ros2(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a ROS 2 bag.
 
     Raises:
@@ -137,7 +137,7 @@ def open_ros2(path: Path, choice: Choice, uri: str, report: Report = silent) -> 
     return open_ros(bag, path.stem, "ros2-bag", uri, choice, report)
 
 
-def open_ros_mcap(path: Path, choice: Choice, uri: str, report: Report = silent) -> Session:
+def open_ros_mcap(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open an MCAP file of another program.
 
     Raises:
@@ -153,7 +153,7 @@ def open_ros_mcap(path: Path, choice: Choice, uri: str, report: Report = silent)
     return open_ros(bag, path.stem, "ros-mcap", uri, choice, report)
 
 
-def open_realsense(path: Path, choice: Choice, uri: str, report: Report = silent) -> Session:
+def open_realsense(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a recording of librealsense.
 
     Raises:

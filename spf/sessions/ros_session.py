@@ -121,7 +121,7 @@ def open_ros(bag: Bag, name: str, form: str, uri: str, choice: Choice, report: R
         positions=positions,
         rectify=rectification(lens, uri),
     )
-    check_depth_unit(session)
+    check_depth_unit(session, leave_damaged=True)
     return session
 
 
