@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from app.lane import Lane, Origin
 from app.navigation import Navigation
@@ -23,7 +24,7 @@ class Controller(Navigation):
         async with self.doing("Opening the session"):
             if not uri.strip():
                 raise StartError("Type the path of a session first: a file or a folder.")
-            session = await self.run(lambda _report: self.opener(uri.strip(), camera.strip() or None))
+            session = await self.run(partial(self.opener, uri.strip(), camera.strip() or None))
             if await self.keeper.keep():
                 self.state.load(session, camera.strip())
 

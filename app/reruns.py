@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 
 from app.controller import Controller
 from app.lane import Lane, Origin
@@ -144,7 +145,7 @@ class Reruns:
         held = self._state.session
         if held is not None and str(held.uri) == uri:
             return held, (uri, camera)
-        opened: Session = await self._controller.run(lambda _report: self._controller.opener(uri, camera or None))
+        opened: Session = await self._controller.run(partial(self._controller.opener, uri, camera or None))
         return opened, (uri, camera)
 
     # ---- particles that are no longer in memory

@@ -13,6 +13,7 @@ from spf.render import Renderer
 from spf.sessions import Session, open_session
 from spf.sessions.choice import split_uri
 from spf.sessions.marks import marks_file
+from spf.sessions.progress import Report, silent
 
 __all__ = ["SAMPLES", "bundled", "kernels", "open_shared", "renderer"]
 
@@ -40,7 +41,7 @@ def bundled() -> dict[str, str]:
     return {path.stem: str(path) for path in sorted(SAMPLES.glob("*.mcap"))}
 
 
-def open_shared(uri: str, camera: str | None) -> Session:
+def open_shared(uri: str, camera: str | None, report: Report = silent) -> Session:
     """Open a session once for all pages; a file that changed, or whose marks did, is opened again.
 
     Raises:
@@ -51,6 +52,6 @@ def open_shared(uri: str, camera: str | None) -> Session:
     path, _ = split_uri(uri)
     stamp = [file.stat().st_mtime_ns for file in (path, marks_file(path)) if file.exists()]
     session: Session = pn.state.as_cached(
-        f"session {uri} {camera} {stamp}", lambda: open_session(uri, camera), ttl=_KEPT
+        f"session {uri} {camera} {stamp}", lambda: open_session(uri, camera, report), ttl=_KEPT
     )
     return session

@@ -23,7 +23,7 @@ from spf.track import Tracking, TrackState, track_frame
 __all__ = ["Open", "Wanted", "Work"]
 
 T = TypeVar("T")
-Open = Callable[[str, str | None], Session]
+Open = Callable[[str, str | None, Report], Session]
 Wanted = Callable[[], bool]
 Wait = Callable[[Report], None]
 _log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class Work:
     Args:
         state: of the page.
         runner: its worker.
-        open_: opens a session by path and camera file.
+        open_: opens a session by path and camera file, and reports meanwhile.
         drawn: waits until the browser has shown the latest frame, so that playing never piles up frames.
         kernels: waits in the worker until the kernels are compiled, and reports meanwhile.
         keeper: keeps what was tracked on disk; without it nothing is kept.

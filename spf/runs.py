@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Self
 from spf.errors import RunError
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.sessions import Session, open_session
+from spf.sessions.progress import Report, silent
 from spf.track import TrackedFrame, Tracking, TrackState, begin, run, stated_joints, track_frame
 from spf.trackfile import Track, TrackRow, read_track, row_of, track_of, write_track
 
@@ -194,24 +195,25 @@ def read_run(directory: Path) -> Run:
     return Run(manifest, plan, read_track(directory / TRACK))
 
 
-def reopen_session(manifest: dict[str, Any], uri: str | Path | None = None) -> Session:
+def reopen_session(manifest: dict[str, Any], uri: str | Path | None = None, report: Report = silent) -> Session:
     """Open the session of a run again, and check that it is the same recording.
 
     Args:
         manifest: of the run.
         uri: where the session lies now, if it was moved.
+        report: is told how far that is.
 
     Raises:
         SessionError: it cannot be opened.
         RunError: it is another recording.
     """
     stored = manifest["session"]
-    session = open_session(uri or stored["uri"], camera=stored["camera_file"])
-    check_same_session(manifest, session)
+    session = open_session(uri or stored["uri"], camera=stored["camera_file"], report=report)
+    check_same_session(manifest, session, report)
     return session
 
 
-def check_same_session(manifest: dict[str, Any], session: Session) -> None:
+def check_same_session(manifest: dict[str, Any], session: Session, report: Report = silent) -> None:
     """Check by its fingerprint that a session is the one that a run tracked.
 
     Raises:
@@ -219,7 +221,7 @@ def check_same_session(manifest: dict[str, Any], session: Session) -> None:
         SessionError: a frame cannot be read.
     """
     stored = manifest["session"]["fingerprint"]
-    if stored is not None and session.fingerprint() != stored:  # a live run that was killed has none
+    if stored is not None and session.fingerprint(report) != stored:  # a live run that was killed has none
         raise RunError(
             f"{session.uri} is not the recording of this run (its fingerprint differs): give the right session."
         )

@@ -72,23 +72,32 @@ def show_version(wanted: bool) -> None:
 
 @contextmanager
 def progress_bar() -> Iterator[Callable[[str, float], None]]:
-    """Show a bar on stderr while it is a terminal; gives ``report(what is done, share)``."""
+    """Give ``report(what is done, share)``, which shows a bar on stderr, if that is a terminal, from its first call on."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("", total=1.0)
-        yield lambda text, share: progress.update(task, description=text, completed=share)
+    progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    task = progress.add_task("", total=1.0)
+
+    def report(text: str, share: float) -> None:
+        progress.update(task, description=text, completed=share)
+        progress.start()
+
+    try:
+        yield report
+    finally:
+        progress.stop()
 
 
 def open_given(uri: str, camera: Path | None = None) -> Session:
-    """Open a session that was named on the command line, and pass on its warnings.
+    """Open a session that was named on the command line, show how far that is, and pass on its warnings.
 
     Raises:
         SessionError: it cannot be opened.
     """
     if is_live(uri):
         raise SessionError(f"{uri} is a live sensor: 'spf record {uri} -o FILE' records it, 'spf track' tracks it.")
-    session = open_session(uri, camera)
+    with progress_bar() as report:
+        session = open_session(uri, camera, report)
     for sentence in session.warnings:
         warn(sentence)
     return session

@@ -30,7 +30,7 @@ def evaluate(
     Example:  spf evaluate runs/first --json
     """
     run = read_run(directory)
-    with reopen_session(run.manifest, session) as opened, progress_bar() as report:
+    with progress_bar() as report, reopen_session(run.manifest, session, report) as opened:
         measures = evaluate_run(run, opened, report)
     if not run.manifest["complete"]:
         warn(f"the run was stopped after {len(run.track)} frames, and only those were measured.")

@@ -55,7 +55,7 @@ def report(
         if no_session:
             write_report(run, None, output, None, directory=str(directory), progress=progress)
         else:
-            with reopen_session(run.manifest, session) as opened, Renderer() as renderer:
+            with reopen_session(run.manifest, session, progress) as opened, Renderer() as renderer:
                 write_report(run, opened, output, renderer, directory=str(directory), progress=progress)
     print(f"Wrote {output} ({output.stat().st_size / 2**20:.1f} MB): open it in any browser.")
 
@@ -104,7 +104,7 @@ def export(
         print(f"Wrote {len(run.track)} frames to {output}.")
         return
     side = _view(view, azimuth, elevation, zoom)
-    with progress_bar() as progress, reopen_session(run.manifest, session) as opened, Renderer() as renderer:
+    with progress_bar() as progress, reopen_session(run.manifest, session, progress) as opened, Renderer() as renderer:
         if ending == ".mp4":
             write_film(run, opened, output, renderer, view=side, height=height or 480, speed=speed, progress=progress)
         else:

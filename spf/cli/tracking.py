@@ -182,7 +182,8 @@ def _refuse_recorded(seconds: float | None, wait: bool) -> None:
 def _plan_to_repeat(directory: Path, session: str | None) -> tuple[Session, Plan, Path | None, dict[str, Any]]:
     """Return the session, the plan, the camera file and, of a live run, its facts and the frames that it came to."""
     run = read_run(directory)
-    opened = reopen_session(run.manifest, session)
+    with progress_bar() as report:
+        opened = reopen_session(run.manifest, session, report)
     stored = run.manifest["session"]["camera_file"]
     now = manifest_of(run.plan, opened, None, [])
     changed = [

@@ -18,6 +18,8 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
+from spf.sessions.progress import Report, silent
+
 __all__ = ["DAMAGE", "HDF5_MAGIC", "NPY_MAGIC", "ZIP_MAGIC", "ArrayFile", "ArrayInfo", "open_array_file"]
 
 NPY_MAGIC, ZIP_MAGIC, HDF5_MAGIC = b"\x93NUMPY", b"PK\x03\x04", b"\x89HDF\r\n\x1a\n"
@@ -30,6 +32,7 @@ DAMAGE = (
 
 _LARGEST_SMALL = 2**26  # bytes of an array that is read whole
 _LARGEST_ROW = 2**28  # bytes of a frame, or of a chunk of HDF5
+_CHUNKS_KEPT = 2**26  # bytes of unpacked chunks of HDF5, which may hold a part of each of many frames
 _LARGEST_UNPACKED = 2**33  # bytes of a compressed array, which is unpacked to disk
 _MOST_OBJECTS = 10_000
 _PIECE = 2**22
@@ -63,6 +66,9 @@ class ArrayFile(ABC):
     @abstractmethod
     def row(self, name: str, index: int) -> NDArray[Any]:
         """Read ``array[index]``. Raises one of ``DAMAGE``."""
+
+    def prepare(self, name: str, report: Report) -> None:  # noqa: B027 - only what is packed has to be
+        """Get the rows of an array ready to be read, and report how far that is. Raises one of ``DAMAGE``."""
 
     def _check_small(self, name: str) -> None:
         info = self.arrays[name]
@@ -115,10 +121,9 @@ class NumpyFile(ArrayFile):
         size = math.prod(shape) * info.dtype.itemsize
         if size > _LARGEST_ROW:
             raise ValueError(f"a frame of {size} bytes")
+        self.prepare(name, silent)
         with self._lock:
-            member = self._unpacked.get(name)
-            if member is None:
-                member = self._unpacked[name] = self._unpack(name)
+            member = self._unpacked[name]
             if isinstance(member.file, Path):
                 with member.file.open("rb") as file:
                     data = _read_at(file, member.start + index * size, size)
@@ -126,7 +131,13 @@ class NumpyFile(ArrayFile):
                 data = _read_at(member.file, member.start + index * size, size)
         return np.frombuffer(data, info.dtype).reshape(shape)
 
-    def _unpack(self, name: str) -> _Member:
+    def prepare(self, name: str, report: Report) -> None:
+        """Unpack an array, if it is packed and was not yet."""
+        with self._lock:
+            if name not in self._unpacked:
+                self._unpacked[name] = self._unpack(name, report)
+
+    def _unpack(self, name: str, report: Report) -> _Member:
         info = self.arrays[name]
         with zipfile.ZipFile(self._path) as archive:
             member = archive.getinfo(f"{name}.npy")
@@ -136,19 +147,20 @@ class NumpyFile(ArrayFile):
                     name_size, extra_size = struct.unpack_from("<HH", local, 26)
                     file.seek(member.header_offset + 30 + name_size + extra_size)
                     return _Member(self._path, _read_header(file)[1])
-            size = math.prod(info.shape) * info.dtype.itemsize
+            left = size = math.prod(info.shape) * info.dtype.itemsize
             if size > _LARGEST_UNPACKED:
                 raise ValueError(f"{name} unpacks to {size} bytes: save it with np.savez, uncompressed")
             target = tempfile.TemporaryFile(prefix="spf-")  # noqa: SIM115 - read from until the session is gone
             weakref.finalize(self, target.close)
             with archive.open(member) as packed:
                 _read_header(packed)
-                while size > 0:
-                    piece = packed.read(min(size, _PIECE))
+                while left > 0:
+                    piece = packed.read(min(left, _PIECE))
                     if not piece:
                         raise EOFError
                     target.write(piece)
-                    size -= len(piece)
+                    left -= len(piece)
+                    report("Unpacking", 1 - left / size)
                 packed.read(1)  # at its end the sum of all bytes is checked
         return _Member(target, 0)
 
@@ -158,7 +170,8 @@ class Hdf5File(ArrayFile):
 
     def __init__(self, path: Path) -> None:
         self._lock = threading.RLock()
-        self._file = h5py.File(path, "r", rdcc_nbytes=_LARGEST_ROW // 16)
+        self._file = h5py.File(path, "r", rdcc_nbytes=_CHUNKS_KEPT, rdcc_nslots=10_007)
+        self._read_from: dict[str, h5py.Dataset] = {}  # held open: with a dataset, its unpacked chunks are given up
         self.arrays, self.values = {}, dict(_attributes(self._file))
         self._file.visititems(self._meet)
 
@@ -180,7 +193,9 @@ class Hdf5File(ArrayFile):
     def row(self, name: str, index: int) -> NDArray[Any]:
         """Read ``array[index]``."""
         with self._lock:
-            data = self._file[name]
+            if name not in self._read_from:
+                self._read_from[name] = self._file[name]
+            data = self._read_from[name]
             if math.prod(data.chunks or data.shape[1:]) * data.dtype.itemsize > _LARGEST_ROW:
                 raise ValueError("chunks too large to be read")
             return np.asarray(data[index])

@@ -17,6 +17,7 @@ from spf.sessions.bag import damaged
 from spf.sessions.camera_file import EXAMPLE
 from spf.sessions.choice import Choice
 from spf.sessions.files import check_depth_unit, steady_times
+from spf.sessions.progress import Report
 from spf.sessions.ros_wire import metres_to_counts
 from spf.sessions.session import Session, Side
 from spf.sessions.streams import choose_stream
@@ -94,7 +95,7 @@ def is_arrays(path: Path) -> bool:
         return file.read(8).startswith((NPY_MAGIC, ZIP_MAGIC, HDF5_MAGIC))
 
 
-def open_arrays(path: Path, choice: Choice, uri: str) -> Session:
+def open_arrays(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a file of arrays.
 
     Raises:
@@ -106,6 +107,7 @@ def open_arrays(path: Path, choice: Choice, uri: str) -> Session:
         name = _depth_array(path, file, choice, uri)
         named = _Named(file, {key.rpartition("/")[2]: key for key, info in file.arrays.items() if len(info.shape) <= 3})
         session = _session(path, named, name, choice, uri)
+        file.prepare(name, report)
     except DAMAGE as error:
         raise SessionError(f"{path} is damaged or no file of arrays ({_first_line(error)}): save it again.") from error
     check_depth_unit(session)

@@ -1,25 +1,36 @@
-"""MCAP files of other programs: an index of all messages from one walk over the file, so that a torn one opens too."""
+"""MCAP files of other programs: an index of all messages from one walk over the file, so that a torn one opens too.
+
+The walk steps over the chunks and reads the message index behind each. Only a chunk without one is unpacked for it.
+"""
 
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, MessageIndex, Schema
+from mcap.records import Channel, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from spf.sessions.bag import DAMAGE, ChunkedBag, Place, decompress, unpack_message
+from spf.errors import SessionError
+from spf.sessions.bag import DAMAGE, damaged, unpack_message
+from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Places
+from spf.sessions.bag_packed import Packed
+from spf.sessions.progress import Report, silent
 
 __all__ = ["McapBag"]
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
+_INDEX = struct.Struct("<HI")
+_ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
+_CHUNK = struct.Struct("<QQQII")  # times of its first and last message, size, checksum, length of the compression
+_LONGEST_NAME = 16  # of a compression
 
 
 class McapBag(ChunkedBag):
@@ -28,6 +39,7 @@ class McapBag(ChunkedBag):
     Args:
         path: the file.
         packed: each message is compressed by itself (``compression_mode: MESSAGE`` in ``metadata.yaml``).
+        report: is told how far looking through the file is.
 
     Attributes:
         unknown: topic → encoding, of the topics with messages that are not of ROS.
@@ -36,15 +48,16 @@ class McapBag(ChunkedBag):
     kind = "MCAP file"
     cdr = True
 
-    def __init__(self, path: Path, packed: bool = False) -> None:
+    def __init__(self, path: Path, packed: bool = False, report: Report = silent) -> None:
         super().__init__(path)
-        self._packed = packed
+        self._by_message = packed
         self._channels: dict[int, Channel] = {}
         self._schemas: dict[int, str] = {}
         self.unknown: dict[str, str] = {}
-        found: dict[int, list[Place]] = {}
+        found: dict[int, Places] = {}
         with path.open("rb") as file:
-            whole = self._walk(file, found)
+            whole = self._walk(file, found, report)
+        topics: dict[str, tuple[str, Places]] = {}
         for number, places in found.items():
             channel = self._channels[number]
             if channel.message_encoding not in ("cdr", "ros1"):
@@ -52,13 +65,13 @@ class McapBag(ChunkedBag):
                 continue
             self.cdr = channel.message_encoding == "cdr"
             kind = _ros2_name(self._schemas.get(channel.schema_id, ""))
-            self._add(channel.topic, kind, places)
-        self._finish(whole=whole)
+            topics.setdefault(channel.topic, (kind, Places()))[1].add_all(places)
+        self._finish(topics, whole=whole)
 
-    def _walk(self, file: BinaryIO, found: dict[int, list[Place]]) -> bool:
+    def _walk(self, file: BinaryIO, found: dict[int, Places], report: Report) -> bool:
         """Fill in where the messages lie; tells whether the file was finished and is whole."""
         end = file.seek(0, 2)
-        position, whole, chunk, known = len(MCAP0_MAGIC), False, -1, True
+        position, whole, chunk, known = len(MCAP0_MAGIC), False, OUTSIDE, True
         try:
             while position + _RECORD.size <= end:
                 file.seek(position)
@@ -67,12 +80,10 @@ class McapBag(ChunkedBag):
                     break
                 if opcode == Opcode.MESSAGE:
                     channel, _, time, _ = _MESSAGE.unpack(file.read(_MESSAGE.size))
-                    found.setdefault(channel, []).append(Place(time, -1, position))
+                    found.setdefault(channel, Places()).add(time, OUTSIDE, position)
                 elif opcode == Opcode.MESSAGE_INDEX:
                     known = True
-                    index = MessageIndex.read(_stream(file.read(size)))
-                    places = [Place(time, chunk, offset) for time, offset in index.records]
-                    found.setdefault(index.channel_id, []).extend(places)
+                    _take_index(file.read(size), chunk, found)
                 elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
                     self._take(opcode, file.read(size))
                 elif opcode == Opcode.FOOTER:
@@ -84,25 +95,26 @@ class McapBag(ChunkedBag):
                     known = True
                 if opcode == Opcode.CHUNK:
                     chunk, known = position, False
+                    report("Looking through the recording", position / end)
                 position += _RECORD.size + size
             if not known:
                 self._scan(file, chunk, found)
             # What the end of the file does not tell of a channel is told in the chunk of its first message.
             for number in [number for number, places in found.items() if places and number not in self._channels]:
-                self._names_in(self._unpack(file, found[number][0].chunk))
+                self._names_in(self._packed(file, found[number].first_chunk).unpack(file))
         except DAMAGE:
             whole = False
         for number in [number for number, places in found.items() if number not in self._channels or not places]:
             del found[number]
         return whole
 
-    def _scan(self, file: BinaryIO, chunk: int, found: dict[int, list[Place]]) -> None:
-        data = self._unpack(file, chunk)
+    def _scan(self, file: BinaryIO, chunk: int, found: dict[int, Places]) -> None:
+        data = self._packed(file, chunk).unpack(file)
         self._names_in(data)
         for opcode, offset, content in _records_in(data):
             if opcode == Opcode.MESSAGE:
                 channel, _, time, _ = _MESSAGE.unpack_from(content)
-                found.setdefault(channel, []).append(Place(time, chunk, offset))
+                found.setdefault(channel, Places()).add(time, chunk, offset)
 
     def _names_in(self, data: bytes) -> None:
         for opcode, _, content in _records_in(data):
@@ -117,42 +129,75 @@ class McapBag(ChunkedBag):
             channel = Channel.read(_stream(content))
             self._channels[channel.id] = channel
 
-    def _unpack(self, file: BinaryIO, offset: int) -> bytes:
-        opcode, content = _record_at(file, offset)
-        if opcode != Opcode.CHUNK:
+    def _packed(self, file: BinaryIO, offset: int) -> Packed:
+        end = file.seek(0, 2)
+        file.seek(offset)
+        data = file.read(_RECORD.size + _CHUNK.size + _LONGEST_NAME + 8)
+        opcode, whole = _RECORD.unpack_from(data)
+        _, _, size, crc, length = _CHUNK.unpack_from(data, _RECORD.size)
+        if opcode != Opcode.CHUNK or length > _LONGEST_NAME:
             raise ValueError("no chunk")
-        chunk = Chunk.read(_stream(content))
-        data = decompress(chunk.data, chunk.compression, chunk.uncompressed_size)
-        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-            raise ValueError("a damaged chunk")
-        return data
+        name = _RECORD.size + _CHUNK.size
+        (stored,) = struct.unpack_from("<Q", data, name + length)
+        start = offset + name + length + 8
+        if start + stored > min(end, offset + _RECORD.size + whole):
+            raise ValueError("a chunk longer than its record, or than the file")
+        return Packed(data[name : name + length].decode(), start, stored, size, crc)
 
-    def _message(self, file: BinaryIO, place: Place, chunk: bytes) -> bytes:
-        if place.chunk < 0:
-            opcode, content = _record_at(file, place.offset)
-        else:
-            opcode, size = _RECORD.unpack_from(chunk, place.offset)
-            start = place.offset + _RECORD.size
-            content = chunk[start : start + size]
-            if len(content) < size:
-                raise ValueError("a message longer than its chunk")
-        if opcode != Opcode.MESSAGE:
+    def _outside(self, file: BinaryIO, offset: int) -> bytes:
+        end = file.seek(0, 2)
+        file.seek(offset)
+        head = file.read(_RECORD.size)
+        _, size = _RECORD.unpack(head)
+        if offset + _RECORD.size + size > end:
+            raise ValueError("a record longer than the file")
+        return head + file.read(size)
+
+    def _message(self, data: bytes | memoryview, offset: int, first: int | None = None) -> bytes:
+        opcode, size = _RECORD.unpack_from(data, offset)
+        if opcode != Opcode.MESSAGE or size < _MESSAGE.size:
             raise ValueError("no message")
-        data = content[_MESSAGE.size :]
-        return unpack_message(data) if self._packed else data
+        start, end = offset + _RECORD.size + _MESSAGE.size, offset + _RECORD.size + size
+        end = end if first is None else min(start + first, end)
+        if len(data) < end:
+            raise ValueError("a message longer than its chunk")
+        return bytes(data[start:end])
+
+    def read(self, topic: str, position: int) -> bytes:
+        """Return a message."""
+        data = super().read(topic, position)
+        if not self._by_message:
+            return data
+        try:
+            return unpack_message(data)
+        except DAMAGE as error:
+            raise damaged(self.path, f"message {position} of {topic}") from error
+
+    def heads(self, topic: str, size: int) -> Iterator[tuple[int, bytes]]:
+        """Yield (position, first ``size`` bytes) of all messages of a topic, chunk by chunk; b"" where it is damaged."""
+        if not self._by_message:
+            yield from super().heads(topic, size)
+            return
+        for position in range(self.topics[topic].messages):
+            try:
+                yield position, unpack_message(super().read(topic, position), size)
+            except (SessionError, *DAMAGE):
+                yield position, b""
 
 
 def _stream(content: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(content))
 
 
-def _record_at(file: BinaryIO, offset: int) -> tuple[int, bytes]:
-    end = file.seek(0, 2)
-    file.seek(offset)
-    opcode, size = _RECORD.unpack(file.read(_RECORD.size))
-    if offset + _RECORD.size + size > end:
-        raise ValueError("a record longer than the file")
-    return opcode, file.read(size)
+def _take_index(content: bytes, chunk: int, found: dict[int, Places]) -> None:
+    """Take in the record that follows a chunk: where in it the messages of a channel lie."""
+    channel, size = _INDEX.unpack_from(content)
+    if size > len(content) - _INDEX.size:
+        raise ValueError("an index longer than its record")
+    if chunk == OUTSIDE:
+        raise ValueError("an index before the first chunk")
+    entries = np.frombuffer(content, _ENTRY, size // _ENTRY.itemsize, _INDEX.size)
+    found.setdefault(channel, Places()).add_chunk(entries["time"], chunk, entries["offset"])
 
 
 def _records_in(data: bytes) -> Iterator[tuple[int, int, bytes]]:

@@ -150,14 +150,18 @@ def check_png_sizes(paths: Iterable[Path]) -> None:
             )
 
 
-def check_depth_unit(session: Session) -> None:
+def check_depth_unit(session: Session, *, leave_damaged: bool = False) -> None:
     """Check on a few frames that the depth is believable in the session's unit.
 
+    Args:
+        session: to be checked.
+        leave_damaged: whether frames that cannot be read may be there; they are told when somebody asks for them.
+
     Raises:
-        SessionError: no frame looked at has a reading, or their median depth is far from what a sensor sees.
+        SessionError: no frame looked at can be read or has a reading, or their median depth is far from what a sensor sees.
     """
     looked_at = sorted({int(i) for i in np.linspace(0, len(session) - 1, 5)})
-    readings = np.concatenate([raw[raw > 0] for raw in map(session.raw_depth, looked_at)])
+    readings = np.concatenate([raw[raw > 0] for raw in _looked_at(session, looked_at, leave_damaged)])
     if not readings.size:
         raise SessionError(
             f"{session.uri} has no depth reading in the {len(looked_at)} frames looked at: "
@@ -172,3 +176,15 @@ def check_depth_unit(session: Session) -> None:
             f"{median:.3g} m, and {low:g} to {high:g} m is believable; set depth_unit, or unit= behind the ?, "
             "to the metres of one count."
         )
+
+
+def _looked_at(session: Session, indices: Sequence[int], leave_damaged: bool) -> list[NDArray[np.uint16]]:
+    found, failures = [], []
+    for index in indices:
+        try:
+            found.append(session.raw_depth(index))
+        except SessionError as error:
+            failures.append(error)
+    if failures and not (found and leave_damaged):
+        raise failures[0]
+    return found

@@ -25,6 +25,7 @@ from spf.sessions.marks import (
 from spf.sessions.mcap import McapSession
 from spf.sessions.mcap_index import index_file
 from spf.sessions.mcap_messages import MARKS_RECORD
+from spf.sessions.progress import Report, silent
 from spf.sessions.session import Session
 
 __all__ = [
@@ -76,9 +77,9 @@ class MarkedSession(Session):
             joints[~marked] = recorded.joints[~marked]
         return Truth(joints)
 
-    def fingerprint(self) -> str:
+    def fingerprint(self, report: Report = silent) -> str:
         """Return that of the recording: marks do not make another one of it."""
-        return self.inner.fingerprint()
+        return self.inner.fingerprint(report)
 
     def close(self) -> None:
         """Give back what the recording holds."""

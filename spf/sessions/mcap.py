@@ -29,6 +29,7 @@ from spf.sessions.mcap_messages import (
     decode_joints,
     decode_note,
 )
+from spf.sessions.progress import Report, silent
 from spf.sessions.session import Note, Session
 
 __all__ = ["McapSession", "is_mcap", "open_mcap"]
@@ -84,13 +85,17 @@ def is_mcap(path: Path) -> bool:
     return has_magic(path)
 
 
-def open_mcap(path: Path) -> Session:
+def open_mcap(path: Path, report: Report = silent) -> Session:
     """Open a session in the native format; of a torn file, all the complete frames.
+
+    Args:
+        path: of the file.
+        report: is told how far looking through a torn file is.
 
     Raises:
         SessionError: it is another program's MCAP file, of a newer version, or holds no complete frame.
     """
-    index = index_file(path)
+    index = index_file(path, report)
     stamps = tuple(sorted(index.places.get(DEPTH_TOPIC, {})))
     if SESSION_RECORD in index.metadata and not stamps:
         why = "was torn before its first frame was complete" if not index.whole else "holds no frame"

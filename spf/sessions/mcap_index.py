@@ -20,6 +20,7 @@ from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 
 from spf.errors import SessionError
+from spf.sessions.progress import Report, silent
 
 __all__ = ["DAMAGE", "McapIndex", "Place", "has_magic", "index_file", "read_message", "records_in"]
 
@@ -66,13 +67,18 @@ def has_magic(path: Path) -> bool:
         return file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
 
 
-def index_file(path: Path) -> McapIndex:
-    """Find the messages of an MCAP file: quickly from its summary, else from all complete records."""
+def index_file(path: Path, report: Report = silent) -> McapIndex:
+    """Find the messages of an MCAP file: quickly from its summary, else from all complete records.
+
+    Args:
+        path: of the file.
+        report: is told how far that is.
+    """
     with path.open("rb") as file:
         try:
-            return _from_summary(file) or _from_walk(file)
+            return _from_summary(file) or _from_walk(file, report)
         except DAMAGE:
-            return _from_walk(file)
+            return _from_walk(file, report)
 
 
 def read_message(path: Path, index: McapIndex, topic: str, time: int) -> bytes:
@@ -159,7 +165,7 @@ def _messages_of(file: BinaryIO, chunk: ChunkIndex) -> Iterator[tuple[int, int]]
         yield from ((index.channel_id, time) for time, _ in index.records)
 
 
-def _from_walk(file: BinaryIO) -> McapIndex:
+def _from_walk(file: BinaryIO, report: Report) -> McapIndex:
     """Find all messages that are whole, over damaged stretches: what stands behind one is checked on its own."""
     size = file.seek(0, 2)
     index, topics = McapIndex({}, {}, whole=False), dict[int, str]()
@@ -175,6 +181,7 @@ def _from_walk(file: BinaryIO) -> McapIndex:
             except DAMAGE:
                 break
             offset = start + _RECORD.size + len(content)
+            report("Looking through the torn recording", offset / size)
         begin = _next_chunk(file, offset + 1)
         if begin is not None:
             index = index._replace(damaged=index.damaged + 1)

@@ -10,7 +10,6 @@ import re
 import struct
 from typing import NamedTuple
 
-from spf.errors import SessionError
 from spf.sessions.bag import Bag, damaged
 from spf.sessions.ros_wire import Wire
 
@@ -19,6 +18,7 @@ __all__ = ["RealSenseStream", "realsense_stream"]
 _DEPTH = re.compile(
     r"(?P<device>/device_\d+)(?P<sensor>/sensor_\d+)(?P<stream>/Depth_\d+)/image/data(/compressedDepth)?"
 )
+_LONGEST_TEXT = 2**14  # bytes of what is said of one image
 _STRING, _FLOAT, _PAIR = "std_msgs/msg/String", "std_msgs/msg/Float32", "diagnostic_msgs/msg/KeyValue"
 
 
@@ -79,12 +79,12 @@ def _stamps(bag: Bag, topic: str, metadata: str) -> list[int] | None:
     found = bag.topics.get(metadata)
     if found is None or found.kind != _STRING or found.messages != bag.topics[topic].messages:
         return None
-    stamps = []
-    for position in range(found.messages):
+    stamps = [0] * found.messages
+    for position, head in bag.heads(metadata, _LONGEST_TEXT):
         try:
-            values = _split(Wire(bag.read(metadata, position), bag.cdr).text())
-            stamps.append(round(float(values["timestamp"]) * 1e6))
-        except (SessionError, KeyError, ValueError, OverflowError):
+            values = _split(Wire(head, bag.cdr).text())
+            stamps[position] = round(float(values["timestamp"]) * 1e6)
+        except (KeyError, ValueError, OverflowError):
             return None  # then the images' own headers, which are of the time of recording, must do for all
     return stamps
 

@@ -8,15 +8,19 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from spf.errors import SessionError
 from spf.sessions import bag_ros1, bag_sqlite
 from spf.sessions.bag import Bag, Topic
 from spf.sessions.bag_mcap import McapBag
 from spf.sessions.bag_ros1 import Ros1Bag
-from spf.sessions.bag_sqlite import SqliteBag, is_sqlite_bag
+from spf.sessions.bag_sqlite import SqliteBag, is_sqlite_bag, topic_names
 from spf.sessions.choice import Choice
 from spf.sessions.files import list_files
 from spf.sessions.mcap_index import has_magic
+from spf.sessions.progress import Report
 from spf.sessions.ros_session import open_ros
 from spf.sessions.session import Session
 
@@ -55,13 +59,16 @@ class ChainedBag(Bag):
     def _having(self, topic: str) -> Iterator[Bag]:
         return (part for part in self._parts if topic in part.topics)
 
-    def times(self, topic: str) -> list[int]:
+    def times(self, topic: str) -> NDArray[np.int64]:
         """Return when the messages of a topic were recorded, in ns."""
-        return list(chain.from_iterable(part.times(topic) for part in self._having(topic)))
+        return np.concatenate([part.times(topic) for part in self._having(topic)])
 
-    def heads(self, topic: str) -> Iterator[bytes]:
-        """Yield the first bytes of all messages of a topic."""
-        return chain.from_iterable(part.heads(topic) for part in self._having(topic))
+    def heads(self, topic: str, size: int) -> Iterator[tuple[int, bytes]]:
+        """Yield (position, first ``size`` bytes) of all messages of a topic, file by file."""
+        before = 0
+        for part in self._having(topic):
+            yield from ((before + position, head) for position, head in part.heads(topic, size))
+            before += part.topics[topic].messages
 
     def read(self, topic: str, position: int) -> bytes:
         """Return a message."""
@@ -97,7 +104,7 @@ def is_realsense(path: Path) -> bool:
         return False
     if _starts(path, bag_sqlite.MAGIC):
         try:
-            return is_sqlite_bag(path) and any(name.startswith("/device_") for name in SqliteBag(path).topics)
+            return is_sqlite_bag(path) and any(name.startswith("/device_") for name in topic_names(path))
         except SessionError:
             return False
     if not _starts(path, bag_ros1.MAGIC):
@@ -111,52 +118,52 @@ def is_realsense(path: Path) -> bool:
         return b"topic=/device_" in file.read(_HEAD)
 
 
-def open_ros1(path: Path, choice: Choice, uri: str) -> Session:
+def open_ros1(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a ROS 1 bag.
 
     Raises:
         SessionError: see :func:`spf.sessions.ros_session.open_ros`.
     """
-    return open_ros(Ros1Bag(path), path.stem, "ros1-bag", uri, choice)
+    return open_ros(Ros1Bag(path, report), path.stem, "ros1-bag", uri, choice, report)
 
 
-def open_ros2(path: Path, choice: Choice, uri: str) -> Session:
+def open_ros2(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a ROS 2 bag.
 
     Raises:
         SessionError: its files are missing or packed, or see :func:`spf.sessions.ros_session.open_ros`.
     """
-    bag = _open_folder(path) if path.is_dir() else SqliteBag(path)
-    return open_ros(bag, path.stem, "ros2-bag", uri, choice)
+    bag = _open_folder(path, report) if path.is_dir() else SqliteBag(path, report=report)
+    return open_ros(bag, path.stem, "ros2-bag", uri, choice, report)
 
 
-def open_ros_mcap(path: Path, choice: Choice, uri: str) -> Session:
+def open_ros_mcap(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open an MCAP file of another program.
 
     Raises:
         SessionError: see :func:`spf.sessions.ros_session.open_ros`.
     """
-    bag = McapBag(path)
+    bag = McapBag(path, report=report)
     if not bag.topics:
         others = ", ".join(f"{topic} ({encoding})" for topic, encoding in sorted(bag.unknown.items())) or "none"
         why = f"holds no ROS messages (its topics: {others})"
         if bag.warnings and not bag.unknown:
             why = "is torn or damaged from its start on"
         raise SessionError(f"{path} {why}, and no frame can be read.")
-    return open_ros(bag, path.stem, "ros-mcap", uri, choice)
+    return open_ros(bag, path.stem, "ros-mcap", uri, choice, report)
 
 
-def open_realsense(path: Path, choice: Choice, uri: str) -> Session:
+def open_realsense(path: Path, choice: Choice, uri: str, report: Report) -> Session:
     """Open a recording of librealsense.
 
     Raises:
         SessionError: see :func:`spf.sessions.ros_session.open_ros`.
     """
-    bag = SqliteBag(path) if _starts(path, bag_sqlite.MAGIC) else Ros1Bag(path)
-    return open_ros(bag, path.stem, "realsense", uri, choice)
+    bag = SqliteBag(path, report=report) if _starts(path, bag_sqlite.MAGIC) else Ros1Bag(path, report)
+    return open_ros(bag, path.stem, "realsense", uri, choice, report)
 
 
-def _open_folder(path: Path) -> Bag:
+def _open_folder(path: Path, report: Report) -> Bag:
     yaml = _head(path / _YAML).decode("utf-8", "replace")
     mode = re.search(r"^\s*compression_mode:\s*[\"']?(\w*)", yaml, re.MULTILINE)
     packed = mode is not None and mode[1].lower() == "message"
@@ -166,14 +173,20 @@ def _open_folder(path: Path) -> Bag:
     if not files:
         raise SessionError(f"There is no .db3 and no .mcap file beside {path / _YAML}: copy the whole folder.")
     parts: list[Bag] = []
-    for file in files:
+    for number, file in enumerate(files):
+        part_of = _part_of(report, number, len(files))
         if has_magic(file):
-            parts.append(McapBag(file, packed))
+            parts.append(McapBag(file, packed, part_of))
         elif is_sqlite_bag(file):
-            parts.append(SqliteBag(file, packed))
+            parts.append(SqliteBag(file, packed, part_of))
         else:
             raise SessionError(f"{file} is no part of a ROS 2 bag: take it out of the folder.")
     return parts[0] if len(parts) == 1 else ChainedBag(path, parts)
+
+
+def _part_of(report: Report, number: int, count: int) -> Report:
+    """Return what is told how far one of several equal parts of some work is."""
+    return lambda text, share: report(text, (number + share) / count)
 
 
 def _head(path: Path, size: int = _HEAD) -> bytes:

@@ -18,6 +18,7 @@ from spf.sessions.bag import Bag, damaged
 from spf.sessions.camera_file import EXAMPLE
 from spf.sessions.choice import Choice
 from spf.sessions.files import check_depth_unit
+from spf.sessions.progress import Report
 from spf.sessions.realsense_bag import RealSenseStream, realsense_stream
 from spf.sessions.rectify import Lens, Rectify, rectification
 from spf.sessions.ros_wire import (
@@ -37,6 +38,9 @@ __all__ = ["RosSession", "open_ros"]
 
 #: Metres per count: of integers as REP 118 has it, and what floating point metres are rounded to.
 _INTEGER_UNIT, _FLOAT_UNIT = 0.001, 0.0001
+
+_HEAD = 16  # bytes of a message that hold its time stamp
+_OFTEN = 100  # messages between two reports
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,13 +82,14 @@ class _Depth(NamedTuple):
     image: Image
 
 
-def open_ros(bag: Bag, name: str, form: str, uri: str, choice: Choice) -> Session:
+def open_ros(bag: Bag, name: str, form: str, uri: str, choice: Choice, report: Report) -> Session:
     """Open a recording as a session.
 
     Args:
         bag: the recording.
         name, form, uri: of the session.
         choice: what was chosen of it.
+        report: is told how far reading the time stamps is.
 
     Raises:
         SessionError: there is no depth, or several topics with depth and none is chosen; no camera belongs to it; the
@@ -93,7 +98,7 @@ def open_ros(bag: Bag, name: str, form: str, uri: str, choice: Choice) -> Sessio
     depth = _find_depth(bag, uri, choice)
     stream = realsense_stream(bag, depth.topic)
     lens, notes = _lens(bag, depth, stream, uri, choice)
-    positions, times, warnings = _times(bag, depth.topic, stream, uri)
+    positions, times, warnings = _times(bag, depth.topic, stream, uri, report)
     is_float = depth.image.encoding == "32FC1"
     unit = choice.depth_unit or (stream and stream.unit) or (_FLOAT_UNIT if is_float else _INTEGER_UNIT)
     if is_float:
@@ -116,7 +121,7 @@ def open_ros(bag: Bag, name: str, form: str, uri: str, choice: Choice) -> Sessio
         positions=positions,
         rectify=rectification(lens, uri),
     )
-    check_depth_unit(session)
+    check_depth_unit(session, leave_damaged=True)
     return session
 
 
@@ -222,25 +227,29 @@ def _camera_topic(bag: Bag, depth: _Depth, size: tuple[int, int], uri: str) -> s
 
 
 def _times(
-    bag: Bag, topic: str, stream: RealSenseStream | None, uri: str
+    bag: Bag, topic: str, stream: RealSenseStream | None, uri: str, report: Report
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[str, ...]]:
     """Return which messages are frames, in order, their times in ns, and what is to be said of them."""
-    heads = [_stamp(head, bag.cdr) for head in bag.heads(topic)]
-    readable = np.array([stamp is not None for stamp in heads], dtype=bool)
+    count = bag.topics[topic].messages
+    stamps, readable = np.zeros(count, np.int64), np.zeros(count, bool)
+    for done, (position, head) in enumerate(bag.heads(topic, _HEAD)):
+        stamp = _stamp(head, bag.cdr)
+        if stamp is not None:
+            stamps[position], readable[position] = stamp, True
+        if done % _OFTEN == 0:
+            report("Reading the time stamps", done / count)
     if not readable.any():
         raise SessionError(f"{uri}: no message of {topic} can be read; copy the recording again.")
     if stream is not None and stream.stamps_ns is not None:
         stamps = np.array(stream.stamps_ns, dtype=np.int64)
-    else:
-        stamps = np.array([stamp or 0 for stamp in heads], dtype=np.int64)
     warnings = []
     if not readable.all():
-        warnings.append(f"{int((~readable).sum())} of the {len(heads)} depth images are damaged and were left out.")
+        warnings.append(f"{int((~readable).sum())} of the {count} depth images are damaged and were left out.")
     positions = np.flatnonzero(readable)
     # Sensors that set no clock leave zeros, or the same time again and again: then the time of recording is the better.
     times = stamps[positions]
     if len(np.unique(times)) < 0.5 * len(times) or (len(times) > 1 and not times.any()):
-        times = np.array(bag.times(topic), dtype=np.int64)[positions]
+        times = bag.times(topic)[positions]
         warnings.append("The images have no time stamps of their own: the times of recording were taken.")
     order = np.argsort(times, kind="stable")
     positions, times = positions[order], times[order]

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Camera, Frame, Truth
+from spf.sessions.progress import Report, silent
 
 __all__ = ["Note", "Session", "Side"]
 
@@ -123,21 +124,28 @@ class Session(ABC):
     def __iter__(self) -> Iterator[Frame]:
         return (self[index] for index in range(len(self)))
 
-    def fingerprint(self) -> str:
+    def fingerprint(self, report: Report = silent) -> str:
         """Return the SHA-256 of camera, depth unit, times and all raw depth: equal for equal recordings in any format.
+
+        Args:
+            report: is told how far reading all the depth is, the first time.
 
         Raises:
             SessionError: a frame cannot be read.
         """
-        return self._fingerprint
+        if not self._fingerprint:
+            digest = hashlib.sha256(json.dumps([*self.camera, self.depth_unit]).encode())
+            digest.update(self.times_ns.astype("<i8").tobytes())
+            for index in range(len(self)):
+                digest.update(self.raw_depth(index).astype("<u2").tobytes())
+                report("Reading the whole recording", (index + 1) / len(self))
+            self._fingerprint.append(digest.hexdigest())
+        return self._fingerprint[0]
 
     @cached_property
-    def _fingerprint(self) -> str:
-        digest = hashlib.sha256(json.dumps([*self.camera, self.depth_unit]).encode())
-        digest.update(self.times_ns.astype("<i8").tobytes())
-        for index in range(len(self)):
-            digest.update(self.raw_depth(index).astype("<u2").tobytes())
-        return digest.hexdigest()
+    def _fingerprint(self) -> list[str]:
+        """Holds the fingerprint once it was asked for."""
+        return []
 
     def close(self) -> None:  # noqa: B027 - only live sources hold something to give back
         """Give back what the session holds (files are opened for each read, so nothing by default)."""

@@ -1,0 +1,14 @@
+"""How far the opening of a long recording is: a function is told, and may end it by raising."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+__all__ = ["Report", "silent"]
+
+#: Called with what is being done and the share done, 0 to 1.
+Report = Callable[[str, float], None]
+
+
+def silent(_text: str, _share: float) -> None:
+    """Tell nobody."""
