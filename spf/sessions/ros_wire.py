@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from spf.sessions.png import decode_depth_png
 from spf.sessions.rectify import Lens
+from spf.sessions.rvl import decode_rvl
 
 __all__ = ["CAMERA_INFO", "COMPRESSED", "IMAGE", "CameraInfo", "Image", "Wire", "decode_camera_info", "decode_image"]
 
@@ -152,15 +153,15 @@ def decode_image(data: bytes, kind: str, cdr: bool) -> Image:
 
 
 def _decode_compressed(wire: Wire, stamp: int, frame: str) -> Image:
-    """Decode a compressedDepth image: 12 bytes of settings, then a PNG of counts or of quantised inverse depth."""
+    """Decode a compressedDepth image: 12 bytes of settings, then counts or quantised inverse depth, as PNG or in RVL."""
     layout, data = wire.text(), wire.blob()
     encoding, _, transport = (part.strip() for part in layout.partition(";"))
     if "compressedDepth" not in transport or encoding not in _DEPTH:
         return Image(stamp, frame, layout, None)
-    if "rvl" in transport.lower():
-        return Image(stamp, frame, "compressedDepth rvl (record it with format png)", None)
     _, a, b = _CONFIG.unpack_from(data)
-    stored = decode_depth_png(data[_CONFIG.size :], "the compressedDepth image")
+    image = data[_CONFIG.size :]
+    is_rvl = "rvl" in transport.lower()
+    stored = decode_rvl(image) if is_rvl else decode_depth_png(image, "the compressedDepth image")
     if encoding != "32FC1":
         return Image(stamp, frame, encoding, stored)
     with np.errstate(divide="ignore", invalid="ignore"):

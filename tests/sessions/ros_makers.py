@@ -15,6 +15,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
 from spf.frame import Camera
+from tests.reference.rvl import encode_rvl
 from tests.sessions.makers import Made, scene
 
 WIDTH, HEIGHT = 40, 30
@@ -58,8 +59,8 @@ class Topics:
         )
 
     def compressed(self, pixels: np.ndarray, stamp: int, layout: str, a: float = 0, b: float = 0) -> Any:
-        png = cv2.imencode(".png", pixels)[1].tobytes()
-        data = np.frombuffer(struct.pack("<iff", 0, a, b) + png, np.uint8)
+        code = encode_rvl(pixels) if "rvl" in layout else cv2.imencode(".png", pixels)[1].tobytes()
+        data = np.frombuffer(struct.pack("<iff", 0, a, b) + code, np.uint8)
         return self.make(
             "sensor_msgs/msg/CompressedImage", header=self.header(stamp, "depth"), format=layout, data=data
         )
@@ -156,6 +157,18 @@ def make_ros2_bag(path: Path, rng: np.random.Generator, frames: int = 5) -> Made
 def make_ros_mcap(path: Path, rng: np.random.Generator, frames: int = 5) -> Made:
     raw = scene(rng, frames, WIDTH, HEIGHT)
     file = write_ros2(path.with_name(f"{path.name}-bag"), depth_messages(Topics(ros1=False), raw), mcap=True)
+    return Made(file, raw, CAMERA, None)
+
+
+def make_ros_rvl(path: Path, rng: np.random.Generator, frames: int = 5) -> Made:
+    """Images in RVL."""
+    topics, raw = Topics(ros1=False), scene(rng, frames, WIDTH, HEIGHT)
+    messages = []
+    for image, stamp in zip(raw, stamps(frames), strict=True):
+        messages.append(("/head/depth/camera_info", stamp, topics.camera_info(CAMERA, stamp)))
+        packed = topics.compressed(image, stamp, "16UC1; compressedDepth rvl")
+        messages.append(("/head/depth/image_raw/compressedDepth", stamp, packed))
+    file = write_ros2(path.with_name(f"{path.name}-bag"), messages, mcap=True)
     return Made(file, raw, CAMERA, None)
 
 

@@ -102,7 +102,9 @@ def test_floating_point_metres(tmp_path, raw):
     check(coarse, raw)
 
 
-@pytest.mark.parametrize("layout", ["16UC1; compressedDepth", "16UC1; compressedDepth png"])
+@pytest.mark.parametrize(
+    "layout", ["16UC1; compressedDepth", "16UC1; compressedDepth png", "16UC1; compressedDepth rvl"]
+)
 def test_compressed_depth(tmp_path, raw, layout):
     messages = [
         ("/cam/image_raw/compressedDepth", time, ROS2.compressed(image, time, layout))
@@ -115,13 +117,14 @@ def test_compressed_depth(tmp_path, raw, layout):
     assert both.metadata["topic"] == "/cam/image_raw"
 
 
-def test_compressed_floating_point_depth(tmp_path, raw):
+@pytest.mark.parametrize("code", ["png", "rvl"])
+def test_compressed_floating_point_depth(tmp_path, raw, code):
     # Inverse depth, as compressed_depth_image_transport quantises it: stored = a / depth + b.
     a, b = 5050.0, -504.0
     with np.errstate(divide="ignore"):
         stored = np.where(raw > 0, np.rint(a / (raw * 0.001) + b), 0).astype(np.uint16)
     messages = [
-        ("/cam/image/compressedDepth", time, ROS2.compressed(image, time, "32FC1; compressedDepth png", a, b))
+        ("/cam/image/compressedDepth", time, ROS2.compressed(image, time, f"32FC1; compressedDepth {code}", a, b))
         for image, time in zip(stored, stamps(4), strict=True)
     ]
     session = open_session(write(tmp_path, infos() + messages))
