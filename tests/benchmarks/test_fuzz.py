@@ -8,6 +8,7 @@ import pytest
 from benchmarks.fuzz.case import read_recording, run_case
 from benchmarks.fuzz.damage import DAMAGES
 from benchmarks.fuzz.recordings import RECORDINGS
+from benchmarks.fuzz.worker import Worker
 from spf.sessions.opening import FORMATS
 
 CASES = 20
@@ -42,3 +43,16 @@ def test_what_was_wrong_once_is_refused_or_read(name, seed, tmp_path):
     good = RECORDINGS[name](tmp_path / "good", np.random.default_rng(0)).path
     outcome = run_case(good, seed, tmp_path / "case")
     assert outcome.kind in ("refused", "read"), outcome.text
+
+
+def test_what_libraries_say_of_damage_does_not_stand_among_the_results(tmp_path, capfd):
+    good = RECORDINGS["open3d"](tmp_path / "good", np.random.default_rng(0)).path
+    worker = Worker(good, tmp_path / "case")
+    try:
+        worker.run(20)  # libjpeg: "Corrupt JPEG data"
+        assert "JPEG" in (tmp_path / "case.log").read_text()
+        worker.run(21)
+        assert "JPEG" not in (tmp_path / "case.log").read_text()
+    finally:
+        worker.close()
+    assert capfd.readouterr() == ("", "")
