@@ -2,43 +2,38 @@
 
 from __future__ import annotations
 
-import json
-import signal
 import socket
-import sys
-import threading
 import time
-from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.status import Status
 
-from spf.cli.console import check_output, complain, warn, warn_of
+from spf.cli.console import check_output, complain, warn
+from spf.cli.live_status import (
+    STATUS_EVERY,
+    checked_side,
+    facts,
+    status_line,
+    stopped_by_signals,
+    summarise_recording,
+    take_notes,
+)
+from spf.cli.live_track import track_live
 from spf.cli.sessions import Force
-from spf.errors import RunError, SettingError
-from spf.evaluate import count_losses
-from spf.live import SENSORS, Feed, FeedState, Recording, open_live
-from spf.live.keeping import LiveRun, latency_facts
+from spf.live import SENSORS, Feed, open_live
 from spf.live.network import Publisher
-from spf.live.tracking import Request, find_live_start, follow
-from spf.runs import check_free
-from spf.sessions import Side
+from spf.live.tracking import Request
 from spf.trackers import make_settings
 
-__all__ = ["COMMANDS", "Seconds", "Wait", "record", "stream", "track_live"]
+__all__ = ["COMMANDS", "Seconds", "Wait", "record", "stream"]
 
 LiveSensor = Annotated[
     str, typer.Argument(metavar="URI", help=f"A live sensor: {', '.join(s.example for s in SENSORS.values())}.")
 ]
 Wait = Annotated[bool, typer.Option("--wait", help="Wait for a sensor that is not there yet.")]
 Seconds = Annotated[float | None, typer.Option(min=0.1, help="Stop a live sensor after so long; else at Ctrl-C.")]
-_STATUS_EVERY = 0.5  # s
-_LATELY = 150  # tracked frames that the shown latency is of
 
 
 def record(
@@ -113,100 +108,6 @@ def stream(
         print(f"Sent {feed.state.taken} frames of {sensor}.")
 
 
-def track_live(
-    uri: str,
-    directory: Path,
-    output: Path,
-    request: Request,
-    *,
-    seconds: float | None,
-    wait: bool,
-    force: bool,
-    as_json: bool,
-) -> None:
-    """Track a live sensor while it is recorded, and keep both.
-
-    Raises:
-        RunError: no hand was found until it ended.
-    """
-    check_free(directory, force)
-    make_folder(output.parent)
-    feed = Feed(open_live(uri), wait=wait)
-    feed.record(output, side=request.side, overwrite=force)
-    until = float("inf") if seconds is None else time.monotonic() + seconds
-    kept: LiveRun | None = None
-
-    def stop() -> bool:
-        recording = feed.recording
-        return time.monotonic() > until or (recording is not None and recording.ended != "")
-
-    with feed, stopped_by_signals(), status_line(as_json) as show, ExitStack() as stack:
-        feed.recording_began()
-        take_notes(feed)
-        with suppress(KeyboardInterrupt):
-            start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
-            if start is not None:
-                warn_of(start)
-                command = ["spf", *sys.argv[1:]]
-                kept = LiveRun(directory, output, uri, request, start, command, overwrite=force)
-                stack.enter_context(kept)
-                _follow(feed, request, kept, stop, show)
-        recording, state = feed.stop_recording(), feed.state
-        if kept is not None:
-            kept.finish()
-    assert recording is not None
-    warn(recording.ended)
-    summarise_recording(recording, state, as_json)
-    if kept is None:
-        raise RunError(f"No hand was believed until the end, so nothing was tracked; {output} has all that was seen.")
-    if not as_json:
-        print(_summary(kept, directory))
-
-
-def make_folder(folder: Path) -> None:
-    """Make the folder of a recording.
-
-    Raises:
-        RunError: it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunError(f"The directory {folder} cannot be made: {error.strerror}.") from None
-
-
-def _follow(feed: Feed, request: Request, kept: LiveRun, stop: Callable[[], bool], show: Any) -> None:
-    """Track and show how it goes until it is over."""
-    lately: deque[float] = deque(maxlen=_LATELY)
-    told, dropped, shown = "", 0, 0.0
-    for tracked in follow(feed, request, kept.start, stop):
-        kept.add(tracked)
-        lately.append(tracked.latency)
-        dropped += tracked.dropped
-        now, state, recording = time.monotonic(), feed.state, feed.recording
-        if now - shown > _STATUS_EVERY and recording is not None:
-            shown = now
-            doing = "lost, searching" if tracked.result.lost else "tracking"
-            show({"doing": doing, **latency_facts(list(lately)), "dropped": dropped, **facts(state, recording)})
-            sentence = recording.warning or state.message
-            if sentence != told:
-                told = sentence
-                warn(sentence)
-
-
-def _summary(kept: LiveRun, directory: Path) -> str:
-    track, live = kept.track, kept.facts()
-    if not len(track):
-        return f"A hand was found, but there was no frame left to track. Next: spf evaluate {directory}"
-    losses = count_losses(track.lost)
-    return (
-        f"Tracked {len(track)} of the frames live ({live['dropped']} dropped for newer ones): {losses.losses} losses, "
-        f"{losses.frames_lost} frames without a hand; from capture to estimate {live['latency_ms_median']} ms "
-        f"(median), {live['latency_ms_p95']} ms (95 %).\n"
-        f"Next: spf evaluate {directory}, or repeat it from the recording: spf track --repeat {directory} -o RUN"
-    )
-
-
 def _watch(feed: Feed, until: float, show: Any) -> None:
     """Show how a feed, and its recording if there is one, goes until its time is over or it ends by itself."""
     told = ""
@@ -220,100 +121,8 @@ def _watch(feed: Feed, until: float, show: Any) -> None:
             warn(sentence)
         if state.ended or ended:
             return
-        feed.newest(state.taken - 1, min(_STATUS_EVERY, max(until - time.monotonic(), 0.0)))
-        time.sleep(min(_STATUS_EVERY, max(until - time.monotonic(), 0.0)))
-
-
-def facts(state: FeedState, recording: Recording | None) -> dict[str, Any]:
-    """Return how a feed and its recording stand, ready for JSON."""
-    found: dict[str, Any] = {
-        "sensor": state.about.sensor if state.about else None,
-        "connected": state.connected,
-        "frames": state.taken,
-        "frames_per_second": round(state.rate, 2),
-        "missing_from_sensor": state.missing,
-        "reconnected": state.reconnected,
-    }
-    if recording is not None:
-        found |= {
-            "recorded": recording.frames,
-            "not_recorded": recording.lost,
-            "queued": recording.queued,
-            "recorded_s": round(recording.seconds, 3),
-            "megabytes": round(recording.size / 1e6, 3),
-        }
-    return found
-
-
-def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -> None:
-    """Say what was recorded, and what was not."""
-    if as_json:
-        print(json.dumps({**facts(state, recording), "file": str(recording.path), "complete": True}), flush=True)
-        return
-    lost = f" {recording.lost} frames could not be recorded." if recording.lost else ""
-    missing = f" {state.missing} frames were lost between the sensor and this computer." if state.missing else ""
-    print(
-        f"Recorded {recording.frames} frames ({recording.seconds:.1f} s, {recording.size / 1e6:.1f} MB) to "
-        f"{recording.path}.{lost}{missing}"
-    )
-
-
-def checked_side(text: str | None) -> Side | None:
-    """Read the name of a side.
-
-    Raises:
-        SettingError: it is neither.
-    """
-    if text not in ("left", "right", None):
-        raise SettingError(f"--side takes left or right, not '{text}'.")
-    return text  # type: ignore[return-value]
-
-
-@contextmanager
-def stopped_by_signals() -> Iterator[None]:
-    """Let the end of a session or a service (SIGTERM) end the program as Ctrl-C does: with all files whole."""
-
-    def stop(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, stop)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-@contextmanager
-def status_line(as_json: bool) -> Iterator[Any]:
-    """Give a function that shows facts: as lines of JSON, as one line on a terminal, else not at all."""
-    console = Console(stderr=True)
-    if as_json:
-        yield lambda values: print(json.dumps(values), flush=True)
-        return
-    if not console.is_terminal:
-        yield lambda _values: None
-        return
-    with Status("Connecting", console=console) as status:
-        yield lambda values: status.update(
-            "  ".join(f"{name.replace('_', ' ')} {value}" for name, value in values.items() if value not in (None, 0))
-        )
-
-
-def take_notes(feed: Feed) -> None:
-    """Make markers and notes of what is typed, while a terminal is there."""
-    if sys.stdin is None or not sys.stdin.isatty():
-        return
-
-    def read() -> None:
-        for line in sys.stdin:
-            text = line.strip()
-            if feed.note("note" if text else "marker", text):
-                complain(f"noted: {text}" if text else "marker set.")
-
-    threading.Thread(target=read, name="notes", daemon=True).start()
+        feed.newest(state.taken - 1, min(STATUS_EVERY, max(until - time.monotonic(), 0.0)))
+        time.sleep(min(STATUS_EVERY, max(until - time.monotonic(), 0.0)))
 
 
 COMMANDS = (record, stream)

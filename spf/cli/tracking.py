@@ -21,7 +21,8 @@ from spf.cli.console import (
     warn,
     warn_of,
 )
-from spf.cli.live import Seconds, Wait, track_live
+from spf.cli.live import Seconds, Wait
+from spf.cli.live_track import track_live
 from spf.cli.sessions import AsJson, CameraFile, Force, SessionPath
 from spf.errors import RunError, SettingError
 from spf.evaluate import count_losses

@@ -3,7 +3,8 @@
 This package's own names need no tracker: a headless box that only records or sends imports nothing else.
 """
 
-from spf.live.feed import Feed, FeedState, Taken
+from spf.live.feed import Feed
+from spf.live.feed_state import FeedState, Taken
 from spf.live.opening import SENSORS, is_live, open_live
 from spf.live.recorder import Recorder, Recording
 from spf.live.source import About, Capture, LiveSource

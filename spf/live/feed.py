@@ -7,68 +7,18 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple, Self
-
-import numpy as np
+from typing import Self
 
 from spf.errors import SensorError, SessionError
-from spf.frame import Frame
+from spf.live.feed_state import FeedState, Taken
 from spf.live.recorder import Recorder, Recording
 from spf.live.source import About, Capture, LiveSource
 from spf.sessions import Side
 
-__all__ = ["Feed", "FeedState", "Taken"]
+__all__ = ["Feed"]
 
 _RETRY = 1.0  # s between two attempts to connect
 _RATE_OVER = 60  # captures that the rate is measured over
-
-
-class Taken(NamedTuple):
-    """A capture that the feed took.
-
-    Attributes:
-        index: how many were taken before it.
-        capture: with its time stamp in ns since the first one.
-        about: the sensor.
-        recorded: its index in the recording; None while none is made.
-    """
-
-    index: int  # type: ignore[assignment]  # a tuple's method of that name is not missed
-    capture: Capture
-    about: About
-    recorded: int | None
-
-    def frame(self) -> Frame:
-        """Return it in metres; if it is recorded, with the index that it has there, and the same depth bit by bit."""
-        depth = self.capture.raw * np.float32(self.about.depth_unit)
-        index = self.index if self.recorded is None else self.recorded
-        return Frame(index, self.capture.time_ns / 1e9, depth, self.about.camera, self.capture.colour)
-
-
-class FeedState(NamedTuple):
-    """How a feed stands.
-
-    Attributes:
-        about: the sensor; None until it was open once.
-        connected: whether it is open now.
-        message: why it is not, or what a user should know; "" when all is well.
-        taken: captures until now.
-        missing: gaps in the sensor's count: frames lost before they came here.
-        repeated: captures that were left out because their time was not later than the last one's.
-        rate: captures per second, lately.
-        reconnected: how often the sensor came back.
-        ended: whether no more will come.
-    """
-
-    about: About | None
-    connected: bool
-    message: str
-    taken: int
-    missing: int
-    repeated: int
-    rate: float
-    reconnected: int
-    ended: bool
 
 
 class Feed:

@@ -16,7 +16,8 @@ from spf.errors import StartError
 from spf.frame import Frame
 from spf.hand import HandShape
 from spf.initialise import Progress, Start, find_start
-from spf.live.feed import Feed, Taken
+from spf.live.feed import Feed
+from spf.live.feed_state import Taken
 from spf.manifest import Plan
 from spf.runs import begin_late
 from spf.segmentation import find_regions

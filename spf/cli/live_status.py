@@ -1,0 +1,123 @@
+"""What ``spf record``, ``spf track`` and ``spf stream`` share: how a live source stands, notes that are typed, signals."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.status import Status
+
+from spf.cli.console import complain
+from spf.errors import SettingError
+from spf.live import Feed, FeedState, Recording
+from spf.sessions import Side
+
+__all__ = [
+    "STATUS_EVERY",
+    "checked_side",
+    "facts",
+    "status_line",
+    "stopped_by_signals",
+    "summarise_recording",
+    "take_notes",
+]
+
+STATUS_EVERY = 0.5  # s
+
+
+def facts(state: FeedState, recording: Recording | None) -> dict[str, Any]:
+    """Return how a feed and its recording stand, ready for JSON."""
+    found: dict[str, Any] = {
+        "sensor": state.about.sensor if state.about else None,
+        "connected": state.connected,
+        "frames": state.taken,
+        "frames_per_second": round(state.rate, 2),
+        "missing_from_sensor": state.missing,
+        "reconnected": state.reconnected,
+    }
+    if recording is not None:
+        found |= {
+            "recorded": recording.frames,
+            "not_recorded": recording.lost,
+            "queued": recording.queued,
+            "recorded_s": round(recording.seconds, 3),
+            "megabytes": round(recording.size / 1e6, 3),
+        }
+    return found
+
+
+def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -> None:
+    """Say what was recorded, and what was not."""
+    if as_json:
+        print(json.dumps({**facts(state, recording), "file": str(recording.path), "complete": True}), flush=True)
+        return
+    lost = f" {recording.lost} frames could not be recorded." if recording.lost else ""
+    missing = f" {state.missing} frames were lost between the sensor and this computer." if state.missing else ""
+    print(
+        f"Recorded {recording.frames} frames ({recording.seconds:.1f} s, {recording.size / 1e6:.1f} MB) to "
+        f"{recording.path}.{lost}{missing}"
+    )
+
+
+@contextmanager
+def stopped_by_signals() -> Iterator[None]:
+    """Let the end of a session or a service (SIGTERM) end the program as Ctrl-C does: with all files whole."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def status_line(as_json: bool) -> Iterator[Any]:
+    """Give a function that shows facts: as lines of JSON, as one line on a terminal, else not at all."""
+    console = Console(stderr=True)
+    if as_json:
+        yield lambda values: print(json.dumps(values), flush=True)
+        return
+    if not console.is_terminal:
+        yield lambda _values: None
+        return
+    with Status("Connecting", console=console) as status:
+        yield lambda values: status.update(
+            "  ".join(f"{name.replace('_', ' ')} {value}" for name, value in values.items() if value not in (None, 0))
+        )
+
+
+def take_notes(feed: Feed) -> None:
+    """Make markers and notes of what is typed, while a terminal is there."""
+    if sys.stdin is None or not sys.stdin.isatty():
+        return
+
+    def read() -> None:
+        for line in sys.stdin:
+            text = line.strip()
+            if feed.note("note" if text else "marker", text):
+                complain(f"noted: {text}" if text else "marker set.")
+
+    threading.Thread(target=read, name="notes", daemon=True).start()
+
+
+def checked_side(text: str | None) -> Side | None:
+    """Read the name of a side.
+
+    Raises:
+        SettingError: it is neither.
+    """
+    if text not in ("left", "right", None):
+        raise SettingError(f"--side takes left or right, not '{text}'.")
+    return text  # type: ignore[return-value]

@@ -1,0 +1,118 @@
+"""``spf track`` of a live sensor, and ``spf record --track``: tracked while it is recorded."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+from spf.cli.console import warn, warn_of
+from spf.cli.live_status import STATUS_EVERY, facts, status_line, stopped_by_signals, summarise_recording, take_notes
+from spf.errors import RunError
+from spf.evaluate import count_losses
+from spf.live import Feed, open_live
+from spf.live.keeping import LiveRun, latency_facts
+from spf.live.tracking import Request, find_live_start, follow
+from spf.runs import check_free
+
+__all__ = ["track_live"]
+
+_LATELY = 150  # tracked frames that the shown latency is of
+
+
+def track_live(
+    uri: str,
+    directory: Path,
+    output: Path,
+    request: Request,
+    *,
+    seconds: float | None,
+    wait: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Track a live sensor while it is recorded, and keep both.
+
+    Raises:
+        RunError: no hand was found until it ended.
+    """
+    check_free(directory, force)
+    make_folder(output.parent)
+    feed = Feed(open_live(uri), wait=wait)
+    feed.record(output, side=request.side, overwrite=force)
+    until = float("inf") if seconds is None else time.monotonic() + seconds
+    kept: LiveRun | None = None
+
+    def stop() -> bool:
+        recording = feed.recording
+        return time.monotonic() > until or (recording is not None and recording.ended != "")
+
+    with feed, stopped_by_signals(), status_line(as_json) as show, ExitStack() as stack:
+        feed.recording_began()
+        take_notes(feed)
+        with suppress(KeyboardInterrupt):
+            start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
+            if start is not None:
+                warn_of(start)
+                command = ["spf", *sys.argv[1:]]
+                kept = LiveRun(directory, output, uri, request, start, command, overwrite=force)
+                stack.enter_context(kept)
+                _follow(feed, request, kept, stop, show)
+        recording, state = feed.stop_recording(), feed.state
+        if kept is not None:
+            kept.finish()
+    assert recording is not None
+    warn(recording.ended)
+    summarise_recording(recording, state, as_json)
+    if kept is None:
+        raise RunError(f"No hand was believed until the end, so nothing was tracked; {output} has all that was seen.")
+    if not as_json:
+        print(_summary(kept, directory))
+
+
+def make_folder(folder: Path) -> None:
+    """Make the folder of a recording.
+
+    Raises:
+        RunError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunError(f"The directory {folder} cannot be made: {error.strerror}.") from None
+
+
+def _follow(feed: Feed, request: Request, kept: LiveRun, stop: Callable[[], bool], show: Any) -> None:
+    """Track and show how it goes until it is over."""
+    lately: deque[float] = deque(maxlen=_LATELY)
+    told, dropped, shown = "", 0, 0.0
+    for tracked in follow(feed, request, kept.start, stop):
+        kept.add(tracked)
+        lately.append(tracked.latency)
+        dropped += tracked.dropped
+        now, state, recording = time.monotonic(), feed.state, feed.recording
+        if now - shown > STATUS_EVERY and recording is not None:
+            shown = now
+            doing = "lost, searching" if tracked.result.lost else "tracking"
+            show({"doing": doing, **latency_facts(list(lately)), "dropped": dropped, **facts(state, recording)})
+            sentence = recording.warning or state.message
+            if sentence != told:
+                told = sentence
+                warn(sentence)
+
+
+def _summary(kept: LiveRun, directory: Path) -> str:
+    track, live = kept.track, kept.facts()
+    if not len(track):
+        return f"A hand was found, but there was no frame left to track. Next: spf evaluate {directory}"
+    losses = count_losses(track.lost)
+    return (
+        f"Tracked {len(track)} of the frames live ({live['dropped']} dropped for newer ones): {losses.losses} losses, "
+        f"{losses.frames_lost} frames without a hand; from capture to estimate {live['latency_ms_median']} ms "
+        f"(median), {live['latency_ms_p95']} ms (95 %).\n"
+        f"Next: spf evaluate {directory}, or repeat it from the recording: spf track --repeat {directory} -o RUN"
+    )
