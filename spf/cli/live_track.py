@@ -38,14 +38,14 @@ def track_live(
     """Track a live sensor while it is recorded, and keep both.
 
     Raises:
-        RunError: no hand was found until it ended.
+        RunError: no hand was believed until it ended, or its time was over before one could be tracked.
     """
     check_free(directory, force)
     make_folder(output.parent)
     feed = Feed(open_live(uri), wait=wait)
     feed.record(output, side=request.side, overwrite=force)
     until = float("inf") if seconds is None else time.monotonic() + seconds
-    kept: LiveRun | None = None
+    kept, start = None, None
 
     def stop() -> bool:
         recording = feed.recording
@@ -56,7 +56,7 @@ def track_live(
         take_notes(feed)
         with suppress(KeyboardInterrupt):
             start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
-            if start is not None:
+            if start is not None and not stop():  # else there is no frame left to track, and a run of none helps nobody
                 warn_of(start)
                 command = ["spf", *sys.argv[1:]]
                 kept = LiveRun(directory, output, uri, request, start, command, overwrite=force)
@@ -69,9 +69,23 @@ def track_live(
     warn(recording.ended)
     summarise_recording(recording, state, as_json)
     if kept is None:
-        raise RunError(f"No hand was believed until the end, so nothing was tracked; {output} has all that was seen.")
+        over = seconds is not None and time.monotonic() > until
+        raise RunError(_why_nothing(seconds if over else None, start is not None, output))
     if not as_json:
         print(_summary(kept, directory))
+
+
+def _why_nothing(seconds: float | None, found: bool, output: Path) -> str:
+    """Say why nothing was tracked; ``seconds`` is the time that was given, if it is over."""
+    seen = f"{output} has all that was seen: 'spf track {output} -o RUN' tracks it."
+    if seconds is None:
+        ended = "It ended when the first pose was found" if found else "No hand was believed until the end"
+        return f"{ended}, so nothing was tracked; {seen}"
+    what = "when the first pose was found" if found else "before a hand was believed"
+    return (
+        f"The {seconds:g} s of --seconds were over {what}, so nothing was tracked: finding it takes 6 to 20 s of them, and "
+        f"longer when the program compiles its kernels for the first time; give more. {seen}"
+    )
 
 
 def make_folder(folder: Path) -> None:
@@ -108,7 +122,7 @@ def _follow(feed: Feed, request: Request, kept: LiveRun, stop: Callable[[], bool
 def _summary(kept: LiveRun, directory: Path) -> str:
     track, live = kept.track, kept.facts()
     if not len(track):
-        return f"A hand was found, but there was no frame left to track. Next: spf evaluate {directory}"
+        return "A hand was found, but the sensor gave no frame any more that could be tracked."
     losses = count_losses(track.lost)
     return (
         f"Tracked {len(track)} of the frames live ({live['dropped']} dropped for newer ones): {losses.losses} losses, "

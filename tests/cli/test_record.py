@@ -6,6 +6,7 @@ import json
 import os
 import pty
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ import numpy as np
 import pytest
 
 from benchmarks.kills import kill_once
-from spf.cli import execute
+from spf.cli import execute, live_track
 from spf.sessions import open_session
 from tests.sessions.makers import make_mcap
 
@@ -48,6 +49,30 @@ def test_it_stops_after_its_time(made, tmp_path, capsys):
     out = tmp_path / "r.mcap"
     assert execute(["record", f"replay:{made.path}?loop=1", "-o", str(out), "--seconds", "0.7"]) == 0
     assert 0.4 < open_session(out).times[-1] < 5
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (
+            None,
+            r"The 0.5 s of --seconds were over before a hand was believed, .* give more\. \S+ has all that was seen",
+        ),
+        ("late", r"The 0.5 s of --seconds were over when the first pose was found, so nothing was tracked"),
+    ],
+)
+def test_a_time_too_short_to_track_in_is_named(made, tmp_path, capsys, monkeypatch, found, said):
+    def find(feed, request, progress, stop):
+        while not stop():
+            time.sleep(0.01)
+        return found
+
+    monkeypatch.setattr(live_track, "find_live_start", find)
+    arguments = ["track", f"replay:{made.path}?loop=1", "-o", str(tmp_path / "run"), "--seconds", "0.5"]
+    assert execute(arguments) == 2
+    assert re.search(said, capsys.readouterr().err)
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["session.mcap"]
+    assert len(open_session(tmp_path / "run" / "session.mcap")) > 5
 
 
 @pytest.mark.parametrize(
