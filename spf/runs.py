@@ -12,7 +12,7 @@ from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.sessions import Session, open_session
 from spf.sessions.progress import Report, silent
 from spf.track import TrackedFrame, Tracking, TrackState, begin, run, stated_joints, track_frame
-from spf.trackfile import Track, TrackRow, read_track, row_of, track_of, write_track
+from spf.trackfile import Track, TrackRow, joined, read_track, row_of, track_of, write_track
 
 __all__ = [
     "MANIFEST",
@@ -122,7 +122,8 @@ class RunWriter:
             raise RunError(f"The directory {directory} cannot be made: {error.strerror}.") from None
         self._directory, self._dof_names = directory, dof_names
         self._manifest = {**manifest, "complete": False, "frames_tracked": 0}
-        self._rows: list[TrackRow] = []
+        self._saved = track_of([], dof_names)
+        self._rows: list[TrackRow] = []  # that came after those: as rows they take twice the memory
         self._save(complete=False)
 
     def add(self, result: TrackedFrame) -> None:
@@ -132,20 +133,21 @@ class RunWriter:
             RunError: the directory cannot be written to any more.
         """
         self._rows.append(row_of(result))
-        if len(self._rows) % _SAVED_EVERY == 0:
+        if len(self._rows) == _SAVED_EVERY:
             self._save(complete=False)
 
     def describe(self, manifest: dict[str, Any]) -> None:
         """Replace the manifest by one that knows more: that of a live run, once its recording is finished."""
-        self._manifest = {**manifest, "complete": False, "frames_tracked": len(self._rows)}
+        self._manifest = {**manifest, "complete": False, "frames_tracked": len(self._saved) + len(self._rows)}
 
     def _save(self, *, complete: bool) -> None:
-        self._manifest = save_run(self._directory, self._manifest, self.track, complete=complete)
+        self._saved, self._rows = self.track, []
+        self._manifest = save_run(self._directory, self._manifest, self._saved, complete=complete)
 
     @property
     def track(self) -> Track:
         """What was added until now."""
-        return track_of(self._rows, self._dof_names)
+        return joined([self._saved, track_of(self._rows, self._dof_names)])
 
     def __enter__(self) -> Self:
         return self

@@ -16,7 +16,7 @@ from spf.errors import RunError
 from spf.frame import JOINT_NAMES
 from spf.track import TrackedFrame
 
-__all__ = ["Track", "TrackRow", "read_track", "row_of", "rows_of", "table_of", "track_of", "write_track"]
+__all__ = ["Track", "TrackRow", "joined", "read_track", "row_of", "rows_of", "table_of", "track_of", "write_track"]
 
 Array = NDArray[np.float64]
 
@@ -117,6 +117,22 @@ def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
         dof_names=dof_names,
         timings={stage: numbers([result.timings.get(stage, nan) for result in results]) for stage in stages},
     )
+
+
+def joined(tracks: Sequence[Track]) -> Track:
+    """Return parts of a run, one after the other, as one track; there has to be one at least."""
+    stages = sorted({stage for track in tracks for stage in track.timings})
+
+    def stage_of(track: Track, stage: str) -> Array:
+        return track.timings.get(stage, np.full(len(track), np.nan))
+
+    arrays = {
+        name: np.concatenate([getattr(track, name) for track in tracks])
+        for name in Track._fields
+        if name not in ("dof_names", "timings")
+    }
+    timings = {stage: np.concatenate([stage_of(track, stage) for track in tracks]) for stage in stages}
+    return Track(**arrays, dof_names=tracks[0].dof_names, timings=timings)
 
 
 def rows_of(track: Track) -> list[TrackRow]:

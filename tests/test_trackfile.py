@@ -1,6 +1,7 @@
 """A run kept in a directory: what is written is read back, what was tracked is kept, and a repetition is identical."""
 
 import json
+import tracemalloc
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -13,6 +14,7 @@ from spf.runs import RunWriter, check_free, read_run, reopen_session, track_plan
 from spf.sessions import open_session, write_session
 from spf.synthetic import SyntheticSettings, synthesise
 from spf.trackers import make_settings
+from spf.trackfile import joined, rows_of, track_of
 
 FRAMES = 40
 COLUMNS = ("frame", "lost", "recovered", "poses", "references", "joints", "log_likelihood", "ess", "golden", "overlap")
@@ -135,3 +137,38 @@ def test_runs_that_cannot_be_read(kept, tmp_path):
     (tmp_path / "track.parquet").write_bytes((kept / "track.parquet").read_bytes()[:-100])
     with pytest.raises(RunError, match="torn or no Parquet"):
         read_run(tmp_path)
+
+
+def test_parts_of_a_run_are_joined_to_one_track(kept):
+    track = read_run(kept).track
+    rows = rows_of(track)
+    bare = [row._replace(result=row.result._replace(timings={})) for row in rows[:5]]  # as where the hand is lost
+    whole = track_of([*bare, *rows[5:]], track.dof_names)
+    parts = joined([track_of(part, track.dof_names) for part in ([], bare, rows[5:6], rows[6:])])
+    assert whole.timings.keys() == parts.timings.keys()
+    for name in whole._fields:
+        if name == "timings":
+            for stage in whole.timings:
+                np.testing.assert_array_equal(whole.timings[stage], parts.timings[stage])
+        else:
+            np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name))
+
+
+def test_a_long_run_takes_little_memory(kept, tmp_path):
+    """Hours of a live run: no objects of the tracker are kept, only the numbers that are written."""
+    run = read_run(kept)
+    rows = rows_of(run.track)
+    manifest = {key: value for key, value in run.manifest.items() if key not in ("complete", "frames_tracked")}
+    with RunWriter(tmp_path / "run", manifest, run.track.dof_names) as writer:
+        for _ in range(10):
+            writer.add(rows[0].result)
+        tracemalloc.start()
+        try:
+            for number in range(2000):
+                result = rows[number % len(rows)].result
+                writer.add(result._replace(pose=result.pose.copy(), joints=result.joints.copy()))
+            kept_bytes, _ = tracemalloc.get_traced_memory()
+        finally:
+            tracemalloc.stop()
+    assert kept_bytes < 2000 * 1300
+    assert len(read_run(tmp_path / "run").track) == 2010
