@@ -7,10 +7,10 @@ from functools import partial
 
 from app.lane import Lane, Origin
 from app.navigation import Navigation
-from app.runner import Report
 from spf.errors import HandError, StartError
 from spf.hand import read_hand_shape
 from spf.prepare import prepare
+from spf.progress import Report
 
 __all__ = ["Controller"]
 

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from app.runner import Report
 from app.shelf import plan_of_lane, run_of
 from app.state import State
 from spf.errors import StartError
 from spf.export import View, write_film, write_picture, write_table
+from spf.progress import Report
 from spf.render import Renderer
 from spf.report import write_report
 from spf.runs import Run

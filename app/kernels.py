@@ -7,7 +7,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+
+from spf.progress import Report
 
 __all__ = ["Kernels"]
 
@@ -49,7 +50,7 @@ class Kernels:
             f"({time.monotonic() - self._began:.0f} s)"
         )
 
-    def wait(self, report: Callable[[str, float], None]) -> None:
+    def wait(self, report: Report) -> None:
         """Return when the kernels are ready; the report may end the waiting by an exception."""
         while not self._done.wait(_LOOK):
             report(self.progress, 0.0)

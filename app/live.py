@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.folders import allowed_source
-from app.runner import Report
 from spf.errors import SessionError, SpfError
 from spf.frame import Frame
 from spf.live import Feed, FeedState, Recording, open_live
 from spf.live.tracking import Request, find_live_start, follow
+from spf.progress import Report
 
 __all__ = ["Live", "LiveFacts", "LivePicture"]
 

@@ -11,7 +11,6 @@ import param
 
 from app.controller import Controller
 from app.placed import Placed, with_part
-from app.runner import Report
 from app.state import State
 from spf.errors import HandError, StartError
 from spf.frame import Frame
@@ -21,6 +20,7 @@ from spf.hand.model import Side
 from spf.lens import seen_through
 from spf.posing import Explained, calibrated_from, explained, first_stance, fitted_from, open_hand
 from spf.prepare import SessionFrames
+from spf.progress import Report
 from spf.sessions import Session
 from spf.sessions.marked import path_of
 

@@ -9,11 +9,11 @@ from functools import partial
 from app.controller import Controller
 from app.lane import Lane, Origin
 from app.results import Entry, entry_of
-from app.runner import Report
 from app.shelf import Shelf, reopen
 from app.state import State, warning_of
 from spf.errors import StartError
 from spf.manifest import read_manifest
+from spf.progress import Report
 from spf.runs import MANIFEST
 from spf.sessions import Session
 from spf.track import track_frame

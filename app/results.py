@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from spf.frame import Frame
 from spf.optimisers.trajectory import Trajectory
+from spf.progress import Report
 from spf.sessions import Session
 from spf.settings import Settings
 from spf.track import TrackedFrame, Tracking, TrackState
@@ -101,7 +102,7 @@ class Results:
     @classmethod
     def reopened(
         cls, rows: Sequence[TrackRow], states: Mapping[int, TrackState], tracking: Callable[[int], Tracking],
-        session: Session, report: Callable[[str, float], None],
+        session: Session, report: Report,
     ) -> Results:  # fmt: skip
         """Return what was read from disk: everything but the particles, which are tracked again from the nearest state."""
         results = cls()

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-__all__ = ["CancelledError", "Report", "Runner"]
+from spf.progress import Report
+
+__all__ = ["CancelledError", "Runner"]
 
 T = TypeVar("T")
-Report = Callable[[str, float], None]
 _LOOK = 0.1  # s between two looks at the progress
 
 

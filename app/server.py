@@ -9,11 +9,11 @@ import panel as pn
 
 from app.folders import SAMPLES, allowed_session
 from app.kernels import Kernels
+from spf.progress import Report, silent
 from spf.render import Renderer
 from spf.sessions import Session, open_session
 from spf.sessions.choice import split_uri
 from spf.sessions.marks import marks_file
-from spf.sessions.progress import Report, silent
 
 __all__ = ["SAMPLES", "bundled", "kernels", "open_shared", "renderer"]
 

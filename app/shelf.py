@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 from app.folders import runs_folder
 from app.lane import Lane, Origin
 from app.results import Results
-from app.runner import Report
 from spf.errors import RunError
 from spf.initialise import Start
 from spf.manifest import Change, Plan, manifest_of, read_manifest, write_manifest
+from spf.progress import Report
 from spf.runs import MANIFEST, TRACK, Run, check_same_session, read_run, save_run, tracking_at
 from spf.sessions import Session
 from spf.statefile import read_states, write_states

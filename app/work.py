@@ -13,10 +13,11 @@ from app.clock import Clock
 from app.keeper import Keeper
 from app.lane import Lane
 from app.results import Entry, entry_of
-from app.runner import CancelledError, Report, Runner
+from app.runner import CancelledError, Runner
 from app.state import State
 from spf.errors import SpfError
 from spf.frame import Frame
+from spf.progress import Report
 from spf.sessions import Session, open_session
 from spf.track import Tracking, TrackState, track_frame
 

@@ -7,7 +7,7 @@ one frame, but seldom a hand that moves.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -27,12 +27,12 @@ from spf.learned.network import Network, available_network
 from spf.lens import Through, is_believable, lens_of, lenses_for
 from spf.locate import reach_of, seen_at, strangeness
 from spf.observation import Observation, Suggestion, observe
+from spf.progress import Report, silent
 from spf.search import SearchSettings, size_penalty
 
 __all__ = ["Doubted", "Start", "find_start"]
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 Doubted = Literal["pose", "side"]
 
 DOUBTFUL = 0.46  # mean golden energy over the validation, strangeness included, above which a start is not believed
@@ -121,7 +121,7 @@ def find_start(
     *,
     side: Side | None = None,
     shape: HandShape | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> Start:
     """Find the first pose, and the hand's shape unless it is given.
 
@@ -135,7 +135,7 @@ def find_start(
     Raises:
         StartError: no frame shows anything of a hand's size.
     """
-    report = progress or (lambda _text, _share: None)
+    report = progress or silent
     sides = (shape.side,) if shape else (side,) if side else _SIDES
     network, _ = available_network()
     stated, frames = frames, Through(frames, shape.lens if shape else 1.0)
@@ -279,7 +279,7 @@ def _track(
     return result
 
 
-def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator, report: Progress) -> _Followed:
+def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator, report: Report) -> _Followed:
     """Fit the shape to what the start tracks, its size first, and take the pose along."""
     ahead = frames[start.frame : start.frame + _CALIBRATION_FRAMES]
     shape, pose, energy = start.shape, start.pose, start.energy
@@ -295,7 +295,7 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
     return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy), explained=energy)
 
 
-def _through_a_lens(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator, report: Progress) -> _Followed:
+def _through_a_lens(frames: Sequence[Frame], start: _Followed, rng: np.random.Generator, report: Report) -> _Followed:
     """Calibrate a hand of an unbelievable size again through other lenses, and take the likeliest."""
     length = start.shape.hand().length
     if is_believable(length):

@@ -18,12 +18,12 @@ from spf.frame import Frame
 from spf.hand.handles import Stance, turned_home
 from spf.hand.model import Hand
 from spf.hand.shape import HandShape
-from spf.initialise import Progress
 from spf.learned.network import available_network
 from spf.lens import Through, seen_through
 from spf.locate import reach_of, suggested
 from spf.observation import Observation, observe
 from spf.optimisers.smd import optimise
+from spf.progress import Report, silent
 from spf.segmentation import Region, find_plane, find_regions
 
 __all__ = ["Explained", "calibrated_from", "explained", "first_stance", "fitted_from", "open_hand"]
@@ -117,7 +117,7 @@ def _judged(problem: Problem, stance: Stance) -> Explained:
 
 
 def fitted_from(
-    frame: Frame, shape: HandShape, stance: Stance, rng: np.random.Generator, progress: Progress | None = None
+    frame: Frame, shape: HandShape, stance: Stance, rng: np.random.Generator, progress: Report | None = None
 ) -> Stance:
     """Fit the pose to one frame: SMD from the given pose and from poses around it, the best by its render.
 
@@ -163,7 +163,7 @@ def calibrated_from(
     shape: HandShape,
     stance: Stance,
     rng: np.random.Generator,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> tuple[HandShape, Stance]:
     """Fit size and shape of a hand to what is tracked from a pose on: its size, its lengths and thicknesses, its size again.
 
@@ -180,7 +180,7 @@ def calibrated_from(
     Raises:
         StartError: the first frame shows nothing where the pose puts the hand.
     """
-    report = progress or (lambda _text, _share: None)
+    report = progress or silent
     seen = Through(frames, shape.lens)[:_FRAMES]
     for steps, refine, share in ((_SIZE_STEPS, False, 0.0), (_SHAPE_STEPS, True, 0.4)):
         views = _views(seen, shape, stance, rng, report, share)
@@ -195,7 +195,7 @@ def calibrated_from(
 
 
 def _views(
-    frames: Sequence[Frame], shape: HandShape, stance: Stance, rng: np.random.Generator, report: Progress, share: float
+    frames: Sequence[Frame], shape: HandShape, stance: Stance, rng: np.random.Generator, report: Report, share: float
 ) -> list[View]:
     """Track a hand from a pose on until nothing is seen, and return some of the frames with their poses."""
     hand, settings = shape.hand(), smart.SpfSettings()

@@ -20,10 +20,11 @@ from spf.hand.kinematics import joints_of
 from spf.hand.model import Hand, Side, load_hand
 from spf.hand.pose_file import read_pose
 from spf.hand.shape import HandShape
-from spf.initialise import Progress, Start, find_start
+from spf.initialise import Start, find_start
 from spf.lens import Through, seen_through
 from spf.locate import reach_of
 from spf.observation import observe
+from spf.progress import Report
 from spf.sessions import Session
 
 __all__ = ["SessionFrames", "fit_pose", "prepare", "side_of"]
@@ -79,7 +80,7 @@ def prepare(
     seed: int = 0,
     first: int = 0,
     last: int | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> Start:
     """Prepare the start of a run.
 
@@ -119,7 +120,7 @@ def _from_file(
     path: Path,
     shape: HandShape | None,
     rng: np.random.Generator,
-    progress: Progress | None,
+    progress: Report | None,
 ) -> Start:
     saved = read_pose(path)
     side = shape.side if shape is not None else session.side

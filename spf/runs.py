@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, Self
 
 from spf.errors import RunError
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
+from spf.progress import Report, silent
 from spf.sessions import Session, open_session
-from spf.sessions.progress import Report, silent
 from spf.track import TrackedFrame, Tracking, TrackState, begin, run, stated_joints, track_frame
 from spf.trackfile import Track, TrackRow, joined, read_track, row_of, track_of, write_track
 

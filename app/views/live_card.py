@@ -13,13 +13,13 @@ import panel as pn
 import panel_material_ui as pmu
 
 from app.live import Live, LiveFacts
-from app.runner import Report
 from app.state import State
 from app.views.depth import depth_jpeg
 from app.views.picture import Picture
 from spf.errors import SpfError
 from spf.live import SENSORS
 from spf.live.tracking import Request
+from spf.progress import Report
 from spf.render import Skeleton
 
 __all__ = ["LiveCard", "told"]

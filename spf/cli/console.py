@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from spf import __version__
 from spf.errors import RunError, SessionError, SettingError
 from spf.initialise import Doubted, Start
 from spf.live import is_live
+from spf.progress import Report
 from spf.sessions import Session, open_session
 
 __all__ = [
@@ -71,7 +72,7 @@ def show_version(wanted: bool) -> None:
 
 
 @contextmanager
-def progress_bar() -> Iterator[Callable[[str, float], None]]:
+def progress_bar() -> Iterator[Report]:
     """Give ``report(what is done, share)``, which shows a bar on stderr, if that is a terminal, from its first call on."""
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())

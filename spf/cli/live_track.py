@@ -69,7 +69,7 @@ def track_live(
     warn(recording.ended)
     summarise_recording(recording, state, as_json)
     if kept is None:
-        over = seconds is not None and time.monotonic() > until
+        over = time.monotonic() > until
         raise RunError(_why_nothing(seconds if over else None, start is not None, output))
     if not as_json:
         print(_summary(kept, directory))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,12 +17,12 @@ from spf.errors import RunError
 from spf.initialise import Start
 from spf.manifest import Plan, manifest_of
 from spf.prepare import prepare
+from spf.progress import Report, silent
 from spf.sessions import Session
 
 __all__ = ["COMPARISON", "Comparison", "check_free", "compare", "prepare_comparison"]
 
 COMPARISON, RUNS = "compare.json", "runs"
-Progress = Callable[[str, float], None]
 
 
 class Comparison(NamedTuple):
@@ -73,7 +73,7 @@ def prepare_comparison(
     init: str = "auto",
     first: int = 0,
     last: int | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> Comparison:
     """Prepare one start per seed, for all contenders.
 
@@ -96,7 +96,7 @@ def compare(
     *,
     jobs: int,
     equal_time: bool = False,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Run all contenders with all seeds; what is done is kept in the directory, however the work ends.
 
@@ -114,7 +114,7 @@ def compare(
         RunError: the directory cannot be written to.
         SessionError: a frame cannot be read.
     """
-    report = progress or (lambda text, share: None)
+    report = progress or silent
     shutil.rmtree(directory / RUNS, ignore_errors=True)
     directory.mkdir(parents=True, exist_ok=True)
     session, contenders = comparison.session, comparison.contenders

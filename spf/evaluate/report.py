@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import pose_hand
 from spf.joint_definitions import corrected_joints, offsets_of
 from spf.lens import as_stated, seen_through
+from spf.progress import Report
 from spf.runs import Run
 from spf.sessions import Session, marks_in
 from spf.sessions.marked import BY_HAND
@@ -25,7 +25,6 @@ from spf.trackfile import Track
 __all__ = ["Compared", "compare_run", "evaluate_run", "measures_of"]
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 _GOOD_IOU = 0.6
 
 
@@ -50,7 +49,7 @@ class Compared(NamedTuple):
         return joint_errors(self.corrected, self.truth)
 
 
-def evaluate_run(run: Run, session: Session, progress: Progress | None = None) -> dict[str, Any]:
+def evaluate_run(run: Run, session: Session, progress: Report | None = None) -> dict[str, Any]:
     """Measure a run (spec 9).
 
     Args:
@@ -84,7 +83,7 @@ def measures_of(run: Run, session: Session, compared: Compared) -> dict[str, Any
     return _plain(report | _depth_part(compared) | _losses_part(track) | _work_part(track))
 
 
-def compare_run(run: Run, session: Session, progress: Progress | None = None) -> Compared:
+def compare_run(run: Run, session: Session, progress: Report | None = None) -> Compared:
     """Compare every frame of a run with its depth, and with its truth where there is one.
 
     Args:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from spf.errors import RunError, SettingError
 from spf.export.pictures import VIEWS, View, hand_scene, row_skeletons, view_around
 from spf.export.writing import written_whole
 from spf.frame import Frame
+from spf.progress import Report
 from spf.render import Renderer, ViewCamera, depth_picture
 from spf.runs import Run
 from spf.sessions import Session
@@ -25,7 +26,6 @@ from spf.trackfile import Track
 __all__ = ["write_film"]
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 _BAR = 36  # pixels of the line of text
 _DARK, _LIGHT, _LOST = (25, 29, 34), (222, 227, 232), (255, 150, 90)
 _ROOM = 1.05  # of the joints: the skin reaches beyond them
@@ -42,7 +42,7 @@ def write_film(
     view: View = VIEWS["sensor"],
     height: int = 480,
     speed: float = 1.0,
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> None:
     """Write a run as an MP4 file (H.264), at the session's own pace.
 

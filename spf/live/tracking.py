@@ -15,10 +15,11 @@ import numpy as np
 from spf.errors import StartError
 from spf.frame import Frame
 from spf.hand import HandShape
-from spf.initialise import Progress, Start, find_start
+from spf.initialise import Start, find_start
 from spf.live.feed import Feed
 from spf.live.feed_state import Taken
 from spf.manifest import Plan
+from spf.progress import Report
 from spf.runs import begin_late
 from spf.segmentation import find_regions
 from spf.sessions import Side
@@ -76,7 +77,7 @@ class LiveFrame(NamedTuple):
 
 
 def find_live_start(
-    feed: Feed, request: Request, progress: Progress, stop: Callable[[], bool] = lambda: False
+    feed: Feed, request: Request, progress: Report, stop: Callable[[], bool] = lambda: False
 ) -> Start | None:
     """Find the first pose from what a feed shows now, again and again until one is believed.
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from spf.evaluate import Compared, compare_run, count_losses, measures_of
+from spf.progress import Report
 from spf.report.plots import Line, Panel, Plot, bar_plot, curve_plot, frame_plot, stage_plot
 from spf.report.tracks import held_only, track_plots
 from spf.runs import Run
@@ -32,7 +32,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 
 class SettingRow(NamedTuple):
@@ -55,7 +54,7 @@ class Figures(NamedTuple):
     compared: Compared | None
 
 
-def figures_of(run: Run, session: Session | None, progress: Progress | None = None) -> Figures:
+def figures_of(run: Run, session: Session | None, progress: Report | None = None) -> Figures:
     """Measure a run; without its session only by what the track itself says.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,7 @@ from spf.hand.model import Hand
 from spf.lens import seen_through
 from spf.locate import reach_of
 from spf.observation import observe
+from spf.progress import Report
 from spf.render import Renderer, Skeleton, box_around, depth_picture
 from spf.runs import Run
 from spf.sessions import Session
@@ -22,7 +23,6 @@ from spf.trackfile import Track
 __all__ = ["MOST_LOSSES", "KeyFrame", "Shot", "key_frames", "shots"]
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 MOST_LOSSES = 4  # that are shown with pictures
 _EVENLY = 6
 _SIZE = (560, 420)
@@ -75,7 +75,7 @@ def _losses(lost: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def shots(
-    run: Run, session: Session, keys: list[KeyFrame], renderer: Renderer | None, progress: Progress | None = None
+    run: Run, session: Session, keys: list[KeyFrame], renderer: Renderer | None, progress: Report | None = None
 ) -> Iterator[Shot]:
     """Draw key frames, lazily.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -16,6 +15,7 @@ from markupsafe import Markup
 from spf import __version__
 from spf.errors import RenderUnavailableError, RunError
 from spf.export.writing import written_whole
+from spf.progress import Report, silent
 from spf.render import Renderer
 from spf.report import content
 from spf.report.keyframes import MOST_LOSSES, Shot, key_frames, shots
@@ -25,7 +25,6 @@ from spf.trackers import TRACKERS
 
 __all__ = ["report_html", "write_report"]
 
-Progress = Callable[[str, float], None]
 _COMPARING = 0.6  # share of the work that comparing with the depth is
 
 NO_SESSION = (
@@ -40,7 +39,7 @@ def write_report(
     renderer: Renderer | None,
     *,
     directory: str = "RUN",
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> None:
     """Write the report of a run as one HTML file that needs nothing else.
 
@@ -69,12 +68,12 @@ def report_html(
     renderer: Renderer | None,
     *,
     directory: str = "RUN",
-    progress: Progress | None = None,
+    progress: Report | None = None,
 ) -> str:
     """Return the report of a run as HTML; see :func:`write_report`."""
     if not len(run.track):
         raise RunError("The run has tracked no frame, so that there is nothing to report: track the session again.")
-    report = progress or (lambda _text, _share: None)
+    report = progress or silent
     figures = content.figures_of(run, session, lambda text, share: report(text, _COMPARING * share))
     drawn, cannot_draw = _shots(run, session, figures, renderer, report)
     groups = content.setting_rows(run)
@@ -94,7 +93,7 @@ def report_html(
 
 
 def _shots(
-    run: Run, session: Session | None, figures: content.Figures, renderer: Renderer | None, report: Progress
+    run: Run, session: Session | None, figures: content.Figures, renderer: Renderer | None, report: Report
 ) -> tuple[list[Shot], str]:
     """The pictures of the key frames, and why there are none of the hand, if so."""
     if session is None:

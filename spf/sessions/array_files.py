@@ -18,7 +18,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from spf.sessions.progress import Report, silent
+from spf.progress import Report, silent
 
 __all__ = ["DAMAGE", "HDF5_MAGIC", "NPY_MAGIC", "ZIP_MAGIC", "ArrayFile", "ArrayInfo", "open_array_file"]
 

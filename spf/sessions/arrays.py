@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from spf.errors import SessionError
 from spf.frame import Camera, Truth
+from spf.progress import Report
 from spf.sessions.array_files import DAMAGE, HDF5_MAGIC, NPY_MAGIC, ZIP_MAGIC, ArrayFile, ArrayInfo, open_array_file
 from spf.sessions.bag import damaged
 from spf.sessions.camera_file import EXAMPLE
 from spf.sessions.choice import Choice
 from spf.sessions.files import check_depth_unit, steady_times
-from spf.sessions.progress import Report
 from spf.sessions.ros_wire import metres_to_counts
 from spf.sessions.session import Session, Side
 from spf.sessions.streams import choose_stream

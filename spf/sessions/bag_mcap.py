@@ -18,10 +18,10 @@ from mcap.records import Channel, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from spf.errors import SessionError
+from spf.progress import Report, silent
 from spf.sessions.bag import DAMAGE, damaged, unpack_message
 from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Places
 from spf.sessions.bag_packed import Packed
-from spf.sessions.progress import Report, silent
 
 __all__ = ["McapBag"]
 

@@ -13,10 +13,10 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
+from spf.progress import Report, silent
 from spf.sessions.bag import DAMAGE
 from spf.sessions.bag_chunks import OUTSIDE, ChunkedBag, Places
 from spf.sessions.bag_packed import Packed
-from spf.sessions.progress import Report, silent
 
 __all__ = ["MAGIC", "Ros1Bag"]
 

@@ -15,8 +15,8 @@ import zstandard
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
+from spf.progress import Report, silent
 from spf.sessions.bag import LARGEST, Bag, Topic, damaged, unpack_message
-from spf.sessions.progress import Report, silent
 
 __all__ = ["MAGIC", "SqliteBag", "is_sqlite_bag", "topic_names"]
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Truth
+from spf.progress import Report, silent
 from spf.sessions.choice import split_uri
 from spf.sessions.marks import (
     Mark,
@@ -25,7 +26,6 @@ from spf.sessions.marks import (
 from spf.sessions.mcap import McapSession
 from spf.sessions.mcap_index import index_file
 from spf.sessions.mcap_messages import MARKS_RECORD
-from spf.sessions.progress import Report, silent
 from spf.sessions.session import Session
 
 __all__ = [

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from spf.errors import SessionError
 from spf.frame import Camera, Truth
+from spf.progress import Report, silent
 from spf.sessions.mcap_index import McapIndex, has_magic, index_file, read_message
 from spf.sessions.mcap_messages import (
     CAMERA_TOPIC,
@@ -29,7 +30,6 @@ from spf.sessions.mcap_messages import (
     decode_joints,
     decode_note,
 )
-from spf.sessions.progress import Report, silent
 from spf.sessions.session import Note, Session
 
 __all__ = ["McapSession", "is_mcap", "open_mcap"]

@@ -20,7 +20,7 @@ from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 
 from spf.errors import SessionError
-from spf.sessions.progress import Report, silent
+from spf.progress import Report, silent
 
 __all__ = ["DAMAGE", "McapIndex", "Place", "has_magic", "index_file", "read_message", "records_in"]
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from spf.errors import SessionError
 from spf.frame import Camera
+from spf.progress import Report, silent
 from spf.sessions.arrays import is_arrays, open_arrays
 from spf.sessions.azure_mkv import is_azure_mkv, open_azure_mkv
 from spf.sessions.bop import is_bop, open_bop
@@ -21,7 +22,6 @@ from spf.sessions.msra15 import is_msra15, open_msra15
 from spf.sessions.nyu import is_nyu, open_nyu
 from spf.sessions.open3d import is_open3d, open_open3d
 from spf.sessions.png_folder import is_png_folder, open_png_folder
-from spf.sessions.progress import Report, silent
 from spf.sessions.ros_bags import (
     is_realsense,
     is_ros1,

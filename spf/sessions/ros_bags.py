@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
+from spf.progress import Report
 from spf.sessions import bag_ros1, bag_sqlite
 from spf.sessions.bag import Bag, Topic
 from spf.sessions.bag_mcap import McapBag
@@ -20,7 +21,6 @@ from spf.sessions.bag_sqlite import SqliteBag, is_sqlite_bag, topic_names
 from spf.sessions.choice import Choice
 from spf.sessions.files import list_files
 from spf.sessions.mcap_index import has_magic
-from spf.sessions.progress import Report
 from spf.sessions.ros_session import open_ros
 from spf.sessions.session import Session
 

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
+from spf.progress import Report
 from spf.sessions.bag import Bag, damaged
 from spf.sessions.camera_file import EXAMPLE
 from spf.sessions.choice import Choice
 from spf.sessions.files import check_depth_unit
-from spf.sessions.progress import Report
 from spf.sessions.realsense_bag import RealSenseStream, realsense_stream
 from spf.sessions.rectify import Lens, Rectify, rectification
 from spf.sessions.ros_wire import (

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Camera, Frame, Truth
-from spf.sessions.progress import Report, silent
+from spf.progress import Report, silent
 
 __all__ = ["Note", "Session", "Side"]
 

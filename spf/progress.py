@@ -1,4 +1,4 @@
-"""How far the opening of a long recording is: a function is told, and may end it by raising."""
+"""How far long work is: a function is told, and may end the work by raising."""
 
 from __future__ import annotations
 
