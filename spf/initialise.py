@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 Doubted = Literal["pose", "side"]
 
 DOUBTFUL = 0.46  # mean golden energy over the validation, strangeness included, above which a start is not believed
+_SIDE_MARGIN = 0.01  # by which the other side has to be worse for the side to be believed
 _SIDES: tuple[Side, Side] = ("right", "left")
 _INSTANTS = (0, 15, 30)  # frames in which a hand is looked for, until one convinces
 _CONVINCING = 0.4  # the same under which nothing better is looked for …
@@ -70,7 +71,7 @@ class Start(NamedTuple):
         """What of the start may be wrong; an interface says by it what to do."""
         if self.golden > DOUBTFUL:
             return "pose"
-        return "side" if self.margin < 0.01 else None
+        return "side" if self.margin < _SIDE_MARGIN else None
 
     @property
     def doubt(self) -> str:
@@ -141,7 +142,7 @@ def find_start(
     stated, frames = frames, Through(frames, shape.lens if shape else 1.0)
     best: _Followed | None = None
     for attempt, (index, thorough) in enumerate(_attempts(len(frames), network is not None)):
-        if best is not None and (_clear(best) or (thorough and best.energy < DOUBTFUL) or index > _INSTANTS[-1]):
+        if best is not None and (_clear(best) or (thorough and _believed(best)) or index > _INSTANTS[-1]):
             break
         report("Looking for a hand", min(0.1 * attempt, 0.5))
         hypotheses = hypotheses_of(frames[index], sides, shape, network, rng, thorough=thorough)
@@ -167,6 +168,11 @@ def find_start(
 def _clear(start: _Followed) -> bool:
     """Whether nothing better need be looked for."""
     return start.energy < _CONVINCING and start.margin > _CLEAR_MARGIN
+
+
+def _believed(start: _Followed) -> bool:
+    """Whether neither its pose nor its side is doubted."""
+    return start.energy < DOUBTFUL and start.margin >= _SIDE_MARGIN
 
 
 def _attempts(count: int, quickly: bool) -> list[tuple[int, bool]]:
