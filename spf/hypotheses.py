@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of
-from spf.hand.model import Side, load_hand
+from spf.hand.model import Hand, Side, load_hand
 from spf.hand.shape import HandShape
 from spf.learned.network import Network
-from spf.locate import Seeds, locate, strangeness, suggested
-from spf.observation import observe
+from spf.locate import Seeds, locate, reach_of, strangeness, suggested, unfamiliarity
+from spf.observation import Observation, observe
 from spf.search import SearchSettings
 from spf.segmentation import Region, find_plane, find_regions
 
@@ -35,11 +35,18 @@ class Hypothesis(NamedTuple):
         shape: its side and size.
         pose: (D,) relative to the camera's axes.
         energy: golden energy, and what it is charged for being strange to the network.
+        unfamiliar: what it is charged for where it is: less of a hand, to the network, than another place of the frame.
     """
 
     shape: HandShape
     pose: Array
     energy: float
+    unfamiliar: float = 0.0
+
+    @property
+    def charged(self) -> float:
+        """Energy with every charge."""
+        return self.energy + self.unfamiliar
 
 
 def hypotheses_of(
@@ -72,21 +79,37 @@ def hypotheses_of(
         settings = SearchSettings(scale_spread=0.0) if shape else SearchSettings()
         found: list[Hypothesis] = []
         for number, region in enumerate(regions):
-            observation = observe(frame, region.centre, region.radius, plane=plane)
-            if observation.is_empty:
-                continue
             for seeds in [*(looks[number][side] if looks else []), *([None] if thorough else [])]:
-                if seeds is None and min((h.energy for h in found), default=1.0) < _SUGGESTION_ENOUGH:
+                if seeds is None and _least(found) < _SUGGESTION_ENOUGH:
                     break
+                observation = _around(frame, hand, region, seeds, plane)
+                if observation.is_empty:
+                    continue
                 for scale, pose, energy in locate(hand, observation, region.points, settings, rng, seeds):
                     sized = shape or HandShape(side, scale=scale)
-                    charge = strangeness(network, frame, sized.hand(), pose, np.eye(3))
-                    found.append(Hypothesis(sized, pose, energy + charge))
-            if min((h.energy for h in found), default=1.0) < _GOOD_PLACE:
+                    posed = sized.hand()
+                    charge = strangeness(network, frame, posed, pose, np.eye(3))
+                    found.append(Hypothesis(sized, pose, energy + charge, unfamiliarity(network, frame, posed, pose)))
+            if _least(found) < _GOOD_PLACE:
                 break
-        result += _different(sorted(found, key=lambda h: h.energy), _PER_SIDE)
-    least = min((h.energy for h in result), default=0.0)
-    return [h for h in result if h.energy < 1.5 * least + 0.05]
+        result += _different(sorted(found, key=lambda h: h.charged), _PER_SIDE)
+    familiar = min((h.unfamiliar for h in result), default=0.0)
+    result = [h._replace(unfamiliar=h.unfamiliar - familiar) for h in result]
+    return [h for h in result if h.charged < 1.5 * _least(result) + 0.05]
+
+
+def _least(hypotheses: list[Hypothesis]) -> float:
+    return min((h.charged for h in hypotheses), default=1.0)
+
+
+def _around(frame: Frame, hand: Hand, region: Region, seeds: Seeds | None, plane: Array | None) -> Observation:
+    """Observe what a hand at the first of some seeds would reach, or a whole region.
+
+    An arm is no worse a hand for the hand at its other end, which a hypothesis of it leaves uncovered, nor a hand for its arm.
+    """
+    if seeds is None:
+        return observe(frame, region.centre, region.radius, plane=plane)
+    return observe(frame, seeds.poses[0, :3], reach_of(hand.scaled(float(seeds.scales[0]))), plane=plane)
 
 
 def _promising(

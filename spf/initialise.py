@@ -212,6 +212,7 @@ def _best_followed(
             fitted = Hypothesis(sized, relative_to_camera(views[0].pose, views[0].reference), hypothesis.energy)
         infos = _track(fitted, ahead, rng)
         energy = float(np.mean([info.estimate_golden for _, _, info in infos])) if infos else 1.0
+        energy += hypothesis.unfamiliar
         seen = [
             strangeness(network, frame, fitted.shape.hand(), s.estimate, s.reference)
             for frame, (_, s, _) in list(zip(ahead, infos, strict=False))[::4]
@@ -296,7 +297,8 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
         shape, views, energy = fit_shape(views, shape, rng, iterations=iterations, refine=refine_all)
         pose = relative_to_camera(views[0].pose, views[0].reference)
-    shape, views, energy = size_by_render(views, shape, rng)
+    for _ in range(2):
+        shape, views, energy = size_by_render(views, shape, rng)
     pose = relative_to_camera(views[0].pose, views[0].reference)
     return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy), explained=energy)
 

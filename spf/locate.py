@@ -24,7 +24,18 @@ from spf.parallel import map_threads
 from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
 from spf.segmentation import Region
 
-__all__ = ["Seeds", "around", "locate", "polished", "reach_of", "seen_at", "strangeness", "strangeness_to", "suggested"]
+__all__ = [
+    "Seeds",
+    "around",
+    "locate",
+    "polished",
+    "reach_of",
+    "seen_at",
+    "strangeness",
+    "strangeness_to",
+    "suggested",
+    "unfamiliarity",
+]
 
 Array = NDArray[np.float64]
 _POLISHED, _GLANCED = 10, 4  # hypotheses that SMD is run from, in a search and in a glance
@@ -33,6 +44,7 @@ _LOOKS, _AROUND = 7, 0.07  # places of a region that the network looks at, and m
 _PLACE, _PLACES = 0.08, 3  # m within which guesses are of one place, and the most places of a side
 _STRANGE = 0.1  # golden energy of a nat per joint under the density …
 _FAMILIAR = 8.0  # … of a hand that the network knows well
+_SURE = 12.0  # the same of a hand whose joints the network is sure of, wherever they are
 _NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
 
 
@@ -189,6 +201,24 @@ def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, 
         return 0.0
     seen = seen_at(network, frame, hand, pose, reference)
     return strangeness_to(seen, hand, joints_of(hand, pose, reference))
+
+
+def unfamiliarity(network: Network | None, frame: Frame, hand: Hand, pose: Array) -> float:
+    """Golden energy that a place is charged for not looking like a hand to the network, however one is held; 0 without it.
+
+    By how sure it is of joints around the hand of a pose (D,) relative to the camera's axes, of either side. The end of an
+    arm or an elbow is rendered as well as a hand; but where the fingers of what is no hand are, the network does not know.
+    """
+    if network is None:
+        return 0.0
+    middle = joints_of(hand, pose).mean(axis=0)
+    size = hand.length / load_hand(hand.side).length
+    seen = guesses(network, frame.depth, frame.camera, middle, extent_of(size))
+    sureness = [
+        -3.0 * float(np.log(0.5 * guess.joint_sigma / (guess.scale * load_hand(guess.side).length)).mean())
+        for guess in seen
+    ]
+    return _STRANGE * max(_SURE - max(sureness), 0.0)
 
 
 def seen_at(network: Network, frame: Frame, hand: Hand, pose: Array, reference: Array) -> list[Guess]:

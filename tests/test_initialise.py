@@ -14,7 +14,7 @@ from spf.prepare import SessionFrames, fit_pose
 from spf.synthetic import SyntheticSettings, synthesise
 
 
-@pytest.mark.parametrize(("kind", "number", "first"), [("medium", 0, 15), ("any_view", 2, 28)])
+@pytest.mark.parametrize(("kind", "number", "first"), [("medium", 0, 15), ("any_view", 2, 28), ("back", 52, 7)])
 def test_a_hand_on_a_long_arm_is_not_looked_for_in_the_elbow(kind, number, first):
     session = open_source(synthetic(kind, number, 1, 40)[0])
     frames = SessionFrames(session, first, first + 1)
