@@ -207,7 +207,7 @@ def test_trim_and_split_keep_every_frame_exactly(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert "recorded            2001-09-09 01:46:40 UTC" in lines
     assert [line.split() for line in lines if "event" in line or "marker" in line] == [
-        ["notes", "-0.2", "s", "event:", "before"], ["0.1", "s", "marker:", "early"],
+        ["notes", "-0.2", "s", "event:", "before"], ["0.0", "s", "marker:", "early"],
     ]  # fmt: skip
     assert open_session(middle).notes[0].time == pytest.approx(source.times[4] - source.times[3])
     capsys.readouterr()
