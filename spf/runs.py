@@ -22,6 +22,7 @@ __all__ = [
     "RunWriter",
     "begin_late",
     "check_same_session",
+    "make_directory",
     "read_run",
     "reopen_session",
     "save_run",
@@ -98,6 +99,18 @@ def tracking_at(plan: Plan, tracking: Tracking, frame: int) -> Tracking:
     return tracking._replace(tracker=change.tracker, settings=change.settings, seed=change.seed)
 
 
+def make_directory(directory: Path) -> None:
+    """Make a directory, and those that it lies in, where they are not there yet.
+
+    Raises:
+        RunError: it cannot be made.
+    """
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RunError(f"The directory {directory} cannot be made: {error.strerror}.") from None
+
+
 class RunWriter:
     """Keeps a run in a directory while it is tracked; what was tracked when it ends, however it ends, is kept.
 
@@ -115,11 +128,11 @@ class RunWriter:
         self, directory: Path, manifest: dict[str, Any], dof_names: tuple[str, ...], *, overwrite: bool = False
     ) -> None:
         check_free(directory, overwrite)
+        make_directory(directory)
         try:
-            directory.mkdir(parents=True, exist_ok=True)
             (directory / TRACK).unlink(missing_ok=True)
         except OSError as error:
-            raise RunError(f"The directory {directory} cannot be made: {error.strerror}.") from None
+            raise RunError(f"{directory / TRACK} cannot be replaced: {error.strerror}.") from None
         self._directory, self._dof_names = directory, dof_names
         self._manifest = {**manifest, "complete": False, "frames_tracked": 0}
         self._saved = track_of([], dof_names)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,8 @@ _NUMBERS = ("log_likelihood", "ess", "golden", "overlap", "optimised_share", "ev
 _POSE, _STAGE = "pose_", "seconds_"
 
 
-class Track(NamedTuple):
+@dataclass(frozen=True, eq=False)  # no tuple: its length is the number of frames, not of fields
+class Track:
     """What a run found, N frames.
 
     Attributes:
@@ -128,7 +130,7 @@ def joined(tracks: Sequence[Track]) -> Track:
 
     arrays = {
         name: np.concatenate([getattr(track, name) for track in tracks])
-        for name in Track._fields
+        for name in (field.name for field in fields(Track))
         if name not in ("dof_names", "timings")
     }
     timings = {stage: np.concatenate([stage_of(track, stage) for track in tracks]) for stage in stages}

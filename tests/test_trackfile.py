@@ -2,6 +2,7 @@
 
 import json
 import tracemalloc
+from dataclasses import fields
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -146,7 +147,7 @@ def test_parts_of_a_run_are_joined_to_one_track(kept):
     whole = track_of([*bare, *rows[5:]], track.dof_names)
     parts = joined([track_of(part, track.dof_names) for part in ([], bare, rows[5:6], rows[6:])])
     assert whole.timings.keys() == parts.timings.keys()
-    for name in whole._fields:
+    for name in (field.name for field in fields(whole)):
         if name == "timings":
             for stage in whole.timings:
                 np.testing.assert_array_equal(whole.timings[stage], parts.timings[stage])

@@ -21,8 +21,9 @@ from spf.cli.console import (
     warn,
 )
 from spf.cli.sessions import AsJson, CameraFile, Force, SessionPath
-from spf.cli.tracking import FrameRange, Init
+from spf.cli.tracking import FrameRange, HandFile, Init
 from spf.compare import COMPARISON, check_free, compare, contenders_of, draw_success, prepare_comparison, table
+from spf.hand import read_hand_shape
 from spf.parallel import threads
 from spf.trackers import PRESETS, TRACKERS
 
@@ -54,6 +55,7 @@ def compare_trackers(
         list[str] | None,
         typer.Option("--set", metavar="[LABEL.]NAME=VALUE", help="Change a setting of all or of one; repeatable."),
     ] = None,
+    hand: HandFile = None,
     init: Init = "auto",
     frames: FrameRange = None,
     equal_time: Annotated[
@@ -86,8 +88,8 @@ def compare_trackers(
     with open_given(session, camera) as opened, progress_bar() as report:
         first, last = parse_range(frames, len(opened))
         comparison = prepare_comparison(
-            opened, contenders, range(seeds), command=["spf", *sys.argv[1:]], camera=camera, init=init,
-            first=first, last=last, progress=report,
+            opened, contenders, range(seeds), command=["spf", *sys.argv[1:]], camera=camera,
+            shape=None if hand is None else read_hand_shape(hand), init=init, first=first, last=last, progress=report,
         )  # fmt: skip
         for seed, start in comparison.starts.items():
             for sentence in (start.doubt, start.remark):

@@ -95,6 +95,10 @@ def open_given(uri: str, camera: Path | None = None) -> Session:
     Raises:
         SessionError: it cannot be opened.
     """
+    if is_live(uri) and uri.startswith("replay:"):
+        raise SessionError(
+            f"{uri} plays a recording as if it were live: give the recording itself, {uri.partition(':')[2]}."
+        )
     if is_live(uri):
         raise SessionError(f"{uri} is a live sensor: 'spf record {uri} -o FILE' records it, 'spf track' tracks it.")
     with progress_bar() as report:
@@ -118,10 +122,10 @@ def parse_range(text: str | None, count: int) -> tuple[int, int]:
             raise ValueError
         first, last = int(first_text or 0), int(last_text or count)
     except ValueError:
-        raise SettingError(f"--frames takes a range like 0:100, 50: or :100, not '{text}'.") from None
+        raise SettingError(f"A range of frames is like 0:100, 50: or :100, not '{text}'.") from None
     if not 0 <= first < last <= count:
         raise SettingError(
-            f"--frames {text} is outside the session, which has the frames 0 to {count - 1} (write 0:{count} for all)."
+            f"The range {text} is outside the session, which has the frames 0 to {count - 1} (write 0:{count} for all)."
         )
     return first, last
 

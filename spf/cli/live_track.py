@@ -17,7 +17,7 @@ from spf.evaluate import count_losses
 from spf.live import Feed, open_live
 from spf.live.keeping import LiveRun, latency_facts
 from spf.live.tracking import Request, find_live_start, follow
-from spf.runs import check_free
+from spf.runs import check_free, make_directory
 
 __all__ = ["track_live"]
 
@@ -41,7 +41,7 @@ def track_live(
         RunError: no hand was believed until it ended, or its time was over before one could be tracked.
     """
     check_free(directory, force)
-    make_folder(output.parent)
+    make_directory(output.parent)
     feed = Feed(open_live(uri), wait=wait)
     feed.record(output, side=request.side, overwrite=force)
     until = float("inf") if seconds is None else time.monotonic() + seconds
@@ -86,18 +86,6 @@ def _why_nothing(seconds: float | None, found: bool, output: Path) -> str:
         f"The {seconds:g} s of --seconds were over {what}, so nothing was tracked: finding it takes 6 to 20 s of them, and "
         f"longer when the program compiles its kernels for the first time; give more. {seen}"
     )
-
-
-def make_folder(folder: Path) -> None:
-    """Make the folder of a recording.
-
-    Raises:
-        RunError: it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunError(f"The directory {folder} cannot be made: {error.strerror}.") from None
 
 
 def _follow(feed: Feed, request: Request, kept: LiveRun, stop: Callable[[], bool], show: Any) -> None:

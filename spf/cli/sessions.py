@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,9 +19,9 @@ from spf.cli.console import (
     print_json,
     progress_bar,
 )
-from spf.errors import SettingError, SpfError
+from spf.errors import SettingError
 from spf.segmentation import find_regions
-from spf.sessions import MCAPWriter, Session
+from spf.sessions import Session, copy_frames, copying
 from spf.synthetic import CLUTTER, MOTIONS, SENSORS, SHAPES, SyntheticSettings, synthesise
 
 __all__ = ["COMMANDS", "convert", "info", "split", "synth", "trim"]
@@ -49,9 +49,17 @@ def info(session: SessionPath, camera: CameraFile = None, as_json: AsJson = Fals
         return
     width = max(len(name) for name in facts)
     for name, value in facts.items():
-        text = ", ".join(map(str, value)) if isinstance(value, list) else value
-        text = "–" if text is None or text == "" else text
-        print(f"{name.replace('_', ' '):<{width}}  {text}")
+        print(f"{name.replace('_', ' '):<{width}}  {_readable(value, width + 2)}")
+
+
+def _readable(value: Any, indent: int) -> str:
+    """Write a fact for people: several numbers on a line, several texts on a line each."""
+    if isinstance(value, dict):
+        value = [f"{name}: {text}" for name, text in value.items()]
+    if isinstance(value, list):
+        are_texts = all(isinstance(item, str) for item in value)
+        value = ("\n" + " " * indent if are_texts else ", ").join(map(str, value))
+    return "–" if value in (None, "") else str(value)
 
 
 def _facts(session: Session) -> dict[str, Any]:
@@ -66,6 +74,7 @@ def _facts(session: Session) -> dict[str, Any]:
         "name": session.name,
         "format": session.format,
         "frames": len(session),
+        "recorded": _utc(session.start_time_ns),
         "duration_s": round(duration, 3),
         "frames_per_second": round((len(session) - 1) / duration, 2) if duration > 0 else None,
         "size": [camera.width, camera.height],
@@ -81,9 +90,16 @@ def _facts(session: Session) -> dict[str, Any]:
         "exact_hand_shape": session.hand_shape is not None,
         "sensor": session.metadata.get("sensor"),
         "contents": list(session.contents),
-        "notes": [f"{note.time:.1f} s {note.kind}: {note.text}" for note in session.notes],
+        "details": {name: text for name, text in session.metadata.items() if name not in ("sensor", "marks")},
+        "notes": [f"{note.time:.1f} s {note.kind}" + (f": {note.text}" if note.text else "") for note in session.notes],
         "warnings": list(session.warnings),
     }
+
+
+def _utc(nanoseconds: int) -> str | None:
+    if not nanoseconds:
+        return None
+    return f"{datetime.datetime.fromtimestamp(nanoseconds / 1e9, datetime.UTC):%Y-%m-%d %H:%M:%S} UTC"
 
 
 def convert(
@@ -156,34 +172,19 @@ def _write(session: Session, output: Path, first: int, last: int) -> None:
         SessionError: a frame cannot be read or written; then nothing is kept.
         typer.Exit: Ctrl-C was pressed.
     """
-    part, done = output.with_name(f".{output.name}.part"), 0
-    writer = MCAPWriter(
-        part,
-        camera=session.camera,
-        depth_unit=session.depth_unit,
-        side=session.side,
-        joint_definition=session.joint_definition,
-        hand_shape=session.hand_shape,
-        start_time_ns=session.start_time_ns,
-        metadata=session.metadata,
-        overwrite=True,
-    )
-    try:
-        with writer, progress_bar() as report:
-            for note in session.notes:
-                if session.times[first] <= note.time <= session.times[last - 1]:
-                    writer.add_note(note)
-            for done, index in enumerate(range(first, last), 1):
-                writer.write(session[index])
-                report(f"Writing {output.name}", done / (last - first))
-    except KeyboardInterrupt:
-        os.replace(part, output)
-        complain(f"stopped: about {done} frames were written until now and are kept in {output}.")
-        raise typer.Exit(INTERRUPTED) from None
-    except SpfError:
-        part.unlink(missing_ok=True)
-        raise
-    os.replace(part, output)
+    stopped = False
+    with copying(session, output, overwrite=True) as writer, progress_bar() as report:
+        try:
+            copy_frames(
+                session, writer, first, last, lambda done, count: report(f"Writing {output.name}", done / count)
+            )
+        except KeyboardInterrupt:
+            if not len(writer):  # a session without frames is none
+                raise
+            stopped = True
+    if stopped:
+        complain(f"stopped: about {len(writer)} frames were written until now and are kept in {output}.")
+        raise typer.Exit(INTERRUPTED)
 
 
 def _names(table: Any) -> str:

@@ -41,6 +41,9 @@ from spf.trackfile import Track
 
 __all__ = ["COMMANDS", "calibrate", "track"]
 
+HandFile = Annotated[
+    Path | None, typer.Option("--hand", metavar="HAND.json", help="Shape of the hand; found if not given.")
+]
 FrameRange = Annotated[str | None, typer.Option("--frames", metavar="A:B", help="Only frames A to B−1.")]
 Init = Annotated[str, typer.Option(metavar="auto|truth|POSE.json", help="Where the first pose comes from.")]
 
@@ -98,9 +101,7 @@ def track(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Change a setting, as --set k=3 --set n=4; repeatable."),
     ] = None,
-    hand: Annotated[
-        Path | None, typer.Option(metavar="HAND.json", help="Shape of the hand; found if not given.")
-    ] = None,
+    hand: HandFile = None,
     init: Annotated[
         str | None,
         typer.Option(metavar="auto|truth|POSE.json", help="Where the first pose comes from; auto if not given."),

@@ -14,10 +14,12 @@ from spf.compare.contender import Contender
 from spf.compare.equal_time import equalise
 from spf.compare.workers import Job, open_workers, track_and_measure
 from spf.errors import RunError
+from spf.hand import HandShape
 from spf.initialise import Start
 from spf.manifest import Plan, manifest_of
 from spf.prepare import prepare
 from spf.progress import Report, silent
+from spf.runs import make_directory
 from spf.sessions import Session
 
 __all__ = ["COMPARISON", "Comparison", "check_free", "compare", "prepare_comparison"]
@@ -70,15 +72,17 @@ def prepare_comparison(
     *,
     command: list[str],
     camera: Path | None = None,
+    shape: HandShape | None = None,
     init: str = "auto",
     first: int = 0,
     last: int | None = None,
     progress: Report | None = None,
 ) -> Comparison:
-    """Prepare one start per seed, for all contenders.
+    """Prepare one start per seed, for all contenders; ``shape`` is of the hand where it is known (:func:`prepare`).
 
     Raises:
         StartError: no first pose is found.
+        HandError: the shape is of another hand than the session or the pose file.
         SessionError: a frame cannot be read.
     """
     end = len(session) if last is None else last
@@ -86,7 +90,7 @@ def prepare_comparison(
     for done, seed in enumerate(seeds):
         if progress is not None:
             progress(f"Preparing seed {seed}", done / len(seeds))
-        starts[seed] = prepare(session, init=init, seed=seed, first=first, last=end)
+        starts[seed] = prepare(session, init=init, shape=shape, seed=seed, first=first, last=end)
     return Comparison(session, camera, tuple(contenders), init, first, end, starts, command)
 
 
@@ -116,7 +120,7 @@ def compare(
     """
     report = progress or silent
     shutil.rmtree(directory / RUNS, ignore_errors=True)
-    directory.mkdir(parents=True, exist_ok=True)
+    make_directory(directory)
     session, contenders = comparison.session, comparison.contenders
     uri, shared_time = str(session.uri), None
     with open_workers(jobs) as workers:

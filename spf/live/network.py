@@ -105,6 +105,13 @@ def decode(parts: list[bytes]) -> Message:
         ) from error
 
 
+def _check_port(address: str) -> None:
+    """Check the number of a port, which ZeroMQ takes modulo 65536."""
+    port = address.rpartition(":")[2]
+    if port.isdecimal() and int(port) > 65535:
+        raise SensorError(f"{address} has no such port: ports go up to 65535.")
+
+
 class NetworkSource(LiveSource):
     """Receives what ``spf stream`` sends.
 
@@ -118,6 +125,7 @@ class NetworkSource(LiveSource):
         host, colon, port = uri.place.rpartition(":")
         if not (host and colon and port.isdecimal()):
             raise SensorError(f"{uri.text} must name a host and a port, as zmq://192.168.0.7:5555.")
+        _check_port(uri.text)
         self._address = f"tcp://{uri.place}"
         self._socket: Any = None
         self._first: Message | None = None
@@ -190,6 +198,7 @@ class Publisher:
 
     def __init__(self, address: str) -> None:
         zmq = import_extra("zmq", "stream")
+        _check_port(address)
         self._stream = str(time.time_ns())
         self._socket = zmq.Context.instance().socket(zmq.PUB)
         self._socket.setsockopt(zmq.SNDHWM, _WAITING)

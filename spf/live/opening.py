@@ -53,5 +53,6 @@ def open_live(text: str) -> LiveSource:
     uri = parse_live_uri(text)
     if uri.scheme not in SENSORS:
         known = ", ".join(sensor.example for sensor in SENSORS.values())
-        raise SensorError(f"{text} is no live sensor; there are {known}.")
+        meant = "" if ":" in text else f" A recording is played as if it were live with replay:{text}."
+        raise SensorError(f"{text} is no live sensor; there are {known}.{meant}")
     return SENSORS[uri.scheme].make(uri)

@@ -172,7 +172,8 @@ class RealSense(LiveSource):
         there = ", ".join(f"{_about(rs, d, 'name')} (serial {_about(rs, d, 'serial_number')})" for d in devices)
         which = f"with serial {self._serial} " if self._serial else ""
         raise SensorError(
-            f"No RealSense camera {which}is connected: plug it into a USB 3 port. There {'is ' + there if there else 'is none'}."
+            f"No RealSense camera {which}is connected: plug it into a USB 3 port."
+            + (f" There is {there}." if there else "")
         )
 
     def _profile(self, sensor: Any, name: str) -> Any:

@@ -25,7 +25,7 @@ _QUEUE_FRAMES = 30  # at least
 _LOOK_EVERY = 1.0  # s between looks at the disk
 _SYNC_EVERY = 2.0  # s of frames that a power cut can cost
 _RESERVE = 64 << 20  # bytes that are left free on the disk
-_WARN = 120.0  # s of recording left when the user is warned
+_WARN = (10, 30, 60, 120)  # s of recording left when the user is warned
 
 
 class Recording(NamedTuple):
@@ -139,7 +139,8 @@ class Recorder:
         """How the recording stands now."""
         with self._changed:
             left = max(self._free - _RESERVE, 0.0) / self._rate if self._rate > 0 else float("inf")
-            warning = f"The disk is full in about {left:.0f} s: make room." if left < _WARN and not self._ended else ""
+            within = next((step for step in _WARN if left < step), None)
+            warning = "" if within is None or self._ended else f"The disk is full in less than {within} s: make room."
             return Recording(
                 self._path, len(self._writer), self._frames_queued, self._lost, self._seconds(self._last_ns),
                 self._writer.size, left, warning, self._ended,
@@ -209,7 +210,7 @@ class Recorder:
         with self._changed:
             queued = sum(item.raw.nbytes for item in self._queue if isinstance(item, Capture))
         if self._free < _RESERVE + queued:
-            self._end(f"The disk is nearly full: the recording was ended, its {len(self._writer)} frames are safe.")
+            self._end("The disk is nearly full: the recording was ended, what is recorded is safe.")
 
     def _end(self, why: str) -> None:
         """Take no more frames; what is queued is still written."""

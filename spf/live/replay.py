@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from pathlib import Path
+from urllib.parse import urlencode
 
 import numpy as np
 
@@ -15,14 +15,16 @@ from spf.sessions import Session, open_session
 
 __all__ = ["Replay"]
 
-_OPTIONS = {"speed": "1", "loop": "0", "camera": "camera.json"}
+_CHOICES = {"topic": "/camera/depth", "camera": "camera.json", "camera_info": "/camera/info", "unit": "0.001"}
+_OPTIONS = {"speed": "1", "loop": "0", **_CHOICES}
 _LOOK = 0.2  # s after which a wait lets its user look whether to stop
 
 
 class Replay(LiveSource):
     """A session as a live source; frames that are due are given whether or not somebody is ready, as a sensor does.
 
-    Options: ``speed`` (2: twice as fast), ``loop=1`` (begin again at its end), ``camera`` (file, of a folder without one).
+    Options: ``speed`` (2: twice as fast), ``loop=1`` (begin again at its end), and what is chosen of the recording
+    (:mod:`spf.sessions.choice`).
 
     Raises:
         SensorError: an option is wrong.
@@ -41,9 +43,9 @@ class Replay(LiveSource):
         Raises:
             SensorError: it cannot be opened.
         """
-        camera = self._uri.options.get("camera")
+        chosen = {name: value for name, value in self._uri.options.items() if name in _CHOICES}
         try:
-            session = open_session(Path(self._uri.place), None if camera is None else Path(camera))
+            session = open_session(self._uri.place + ("?" + urlencode(chosen) if chosen else ""))
         except SessionError as error:
             raise SensorError(str(error)) from error
         self._session = session

@@ -35,7 +35,7 @@ _LARGEST_ROW = 2**28  # bytes of a frame, or of a chunk of HDF5
 _CHUNKS_KEPT = 2**26  # bytes of unpacked chunks of HDF5, which may hold a part of each of many frames
 _LARGEST_UNPACKED = 2**33  # bytes of a compressed array, which is unpacked to disk
 _MOST_OBJECTS = 10_000
-_PIECE = 2**22
+_PIECE = 2**18  # bytes unpacked at a time: more of them do not stay in the cache, and take twice the processor time
 
 
 class ArrayInfo(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
@@ -34,11 +34,25 @@ from spf.sessions.mcap_messages import (
     encode_joints,
     encode_note,
 )
-from spf.sessions.session import Note, Session, Side
+from spf.sessions.session import Note, Side
 
-__all__ = ["MCAPWriter", "write_session"]
+__all__ = ["MCAPWriter", "UnwritableError", "already_there"]
 
 _CAMERA_EVERY_NS = 1_000_000_000
+
+
+class UnwritableError(SessionError):
+    """A file cannot be made or written to.
+
+    Args:
+        path: the file.
+        error: what the system says.
+        kept: what is in the file all the same, as a sentence.
+    """
+
+    def __init__(self, path: Path, error: OSError, kept: str = "") -> None:
+        super().__init__(f"{path} cannot be written: {error.strerror}. {kept}".rstrip())
+        self.cause = error
 
 
 class MCAPWriter:
@@ -188,10 +202,8 @@ class MCAPWriter:
         if self.path.is_file():  # no device
             os.truncate(self.path, self._whole)
 
-    def _unwritable(self, error: OSError) -> SessionError:
-        return SessionError(
-            f"{self.path} cannot be written: {error.strerror}. The {self._count} frames before are safe in it."
-        )
+    def _unwritable(self, error: OSError) -> UnwritableError:
+        return UnwritableError(self.path, error, f"The {self._count} frames before are safe in it.")
 
     def close(self) -> None:
         """Write the index and close the file.
@@ -243,53 +255,8 @@ class MCAPWriter:
         self._mcap.add_message(self._channels[topic], stamp, data, stamp, self._count)
 
 
-def write_session(
-    session: Session,
-    path: str | Path,
-    *,
-    overwrite: bool = False,
-    progress: Callable[[int, int], None] | None = None,
-) -> None:
-    """Write a whole session into the native format; the file has its name only when it is complete.
-
-    Args:
-        session: any session.
-        path: the file to write.
-        overwrite: replace a file that is there.
-        progress: called with (frames done, frames in all) after each frame.
-
-    Raises:
-        SessionError: the file exists or cannot be written, or a frame cannot be read.
-    """
-    target = Path(path)
-    part = target.with_name(f".{target.name}.part")
-    if target.exists() and not overwrite:
-        raise _exists(target)
-    writer = MCAPWriter(
-        part,
-        camera=session.camera,
-        depth_unit=session.depth_unit,
-        side=session.side,
-        joint_definition=session.joint_definition,
-        hand_shape=session.hand_shape,
-        start_time_ns=session.start_time_ns,
-        metadata=session.metadata,
-        overwrite=True,
-    )
-    try:
-        with writer:
-            for note in session.notes:
-                writer.add_note(note)
-            for done, frame in enumerate(session, 1):
-                writer.write(frame)
-                if progress is not None:
-                    progress(done, len(session))
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
-
-
-def _exists(path: Path) -> SessionError:
+def already_there(path: Path) -> SessionError:
+    """Return the error of a file that may not be replaced."""
     return SessionError(f"{path} is already there: give another name, or allow it to be overwritten.")
 
 
@@ -297,6 +264,6 @@ def _create(path: Path, overwrite: bool) -> Any:
     try:
         return path.open("wb" if overwrite else "xb")
     except FileExistsError as error:
-        raise _exists(path) from error
+        raise already_there(path) from error
     except OSError as error:
-        raise SessionError(f"{path} cannot be written: {error.strerror}.") from error
+        raise UnwritableError(path, error) from error

@@ -79,7 +79,7 @@ CASES = {
     "unknown preset": (f"{TRACK} --preset best", "There is no preset"),
     "frames beyond the end": (f"{TRACK} --frames 2:9", "outside the session"),
     "frames backwards": (f"{TRACK} --frames 3:2", "outside the session"),
-    "frames no range": (f"{TRACK} --frames 3", "takes a range"),
+    "frames no range": (f"{TRACK} --frames 3", "like 0:100, 50: or :100"),
     "seed no number": (f"{TRACK} --seed one", "--seed"),
     "pose of the other side": ("track good.mcap -o new --init left.json", "left hand"),
     "pose of another hand": ("track good.mcap -o new --init dofs.json", "30 entries"),

@@ -181,8 +181,10 @@ def test_trim_and_split_keep_every_frame_exactly(tmp_path, capsys):
     with MCAPWriter(whole, **options) as writer:
         for frame in session:
             writer.write(frame)
-        writer.add_note(Note(session.times[1], "marker", "early"))
+        writer.add_note(Note(-0.2, "event", "before"))
+        writer.add_note(Note(session.times[1] + 0.01, "marker", "early"))
         writer.add_note(Note(session.times[4], "note", "here"))
+        writer.add_note(Note(session.times[7] + 0.5, "event", "The sensor was lost."))
     source = open_session(whole)
     assert execute(["trim", str(whole), "3:6", str(middle)]) == 0
     assert execute(["split", str(whole), str(tmp_path / "part.mcap"), "--at", "2,5"]) == 0
@@ -198,6 +200,15 @@ def test_trim_and_split_keep_every_frame_exactly(tmp_path, capsys):
             np.testing.assert_array_equal(part.raw_depth(index), source.raw_depth(first + index))
             np.testing.assert_array_equal(part.truth(index).joints, source.truth(first + index).joints)
     assert [(note.kind, note.text) for note in open_session(middle).notes] == [("note", "here")]
+    assert [[note.text for note in part.notes] for part in parts] == [
+        ["before", "early"], ["here"], ["The sensor was lost."],
+    ]  # fmt: skip
+    assert execute(["info", str(parts[0].uri)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "recorded            2001-09-09 01:46:40 UTC" in lines
+    assert [line.split() for line in lines if "event" in line or "marker" in line] == [
+        ["notes", "-0.2", "s", "event:", "before"], ["0.0", "s", "marker:", "early"],
+    ]  # fmt: skip
     assert open_session(middle).notes[0].time == pytest.approx(source.times[4] - source.times[3])
     capsys.readouterr()
     for wrong in (["trim", str(whole), "5:99", str(tmp_path / "x.mcap")], ["trim", str(whole), "1:2", str(middle)]):

@@ -13,6 +13,7 @@ import pytest
 from spf.cli import execute
 from spf.compare import COMPARISON, check_free, compare, contenders_of, prepare_comparison
 from spf.errors import RunError
+from spf.hand import HandShape, write_hand_shape
 from spf.runs import read_run
 from spf.sessions import Session, open_session
 from tests.conftest import REPOSITORY
@@ -106,3 +107,30 @@ def test_the_command_prints_a_table_and_draws_the_curves(tmp_path: Path, capsys:
     assert chosen["setting"] == "rounds"
     assert chosen["value"] == kept["contenders"][0]["settings"]["rounds"] > 1
     assert kept["equal_time"]["of"]["settings"]["n"] == 4
+
+
+def test_a_known_hand_is_that_of_all_contenders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    hand = tmp_path / "hand.json"
+    write_hand_shape(HandShape("right", scale=1.05), hand)
+    arguments = [
+        "compare",
+        _URI,
+        "-o",
+        str(tmp_path / "c"),
+        "--trackers",
+        "gd,few=gd",
+        "--seeds",
+        "1",
+        "--init",
+        "truth",
+    ]
+    arguments += ["--frames", "3:5", "--set", "rounds=1", "--jobs", "1", "--hand"]
+    assert execute([*arguments, str(hand)]) == 0
+    content = json.loads((tmp_path / "c" / COMPARISON).read_text(encoding="utf-8"))
+    for run in content["runs"]:
+        assert read_run(tmp_path / "c" / run["run"]).plan.start.shape.scale == 1.05
+    write_hand_shape(HandShape("left"), hand)
+    capsys.readouterr()
+    assert execute([*arguments, str(hand), "--force"]) == 2
+    assert "The hand shape is of a left hand, and open-close shows a right hand." in capsys.readouterr().err
+    assert execute([*arguments, str(tmp_path / "none.json"), "--force"]) == 2

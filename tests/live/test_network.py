@@ -143,6 +143,10 @@ def test_nothing_there_and_wrong_addresses(monkeypatch, publisher):
         open_live(uri_of(publisher)).open()
     with pytest.raises(SensorError, match="must name a host and a port"):
         open_live("zmq://box")
+    with pytest.raises(SensorError, match="ports go up to 65535"):  # ZeroMQ would take 34463
+        open_live("zmq://box:99999")
+    with pytest.raises(SensorError, match="ports go up to 65535"):
+        Publisher("tcp://*:99999")
     with pytest.raises(SensorError, match="cannot be offered here"):
         Publisher("tcp://192.0.2.1:5555")
     with pytest.raises(SensorError, match="cannot be offered here"):

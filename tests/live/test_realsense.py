@@ -86,7 +86,7 @@ def test_unplugged_and_plugged_in_again(camera, tmp_path, monkeypatch):
         feed.about()
         give(camera, feed, range(5), 9_000.0, hardware=True)
         camera.unplug()
-        while "There is none" not in feed.state.message:
+        while "No RealSense camera is connected" not in feed.state.message:
             time.sleep(0.005)
         assert not feed.state.connected
         camera.plug()  # its clock begins anew

@@ -11,7 +11,8 @@ from spf.errors import SensorError
 from spf.live import Feed, is_live, open_live
 from spf.sessions import open_session
 from tests.live.sources import finish
-from tests.sessions.makers import make_mcap, make_png_folder
+from tests.sessions.makers import make_mcap, make_png_folder, scene
+from tests.sessions.ros_makers import HEIGHT, WIDTH, Topics, depth_messages, write_ros1
 
 
 @pytest.fixture
@@ -57,6 +58,21 @@ def test_a_folder_with_its_camera_elsewhere(tmp_path, rng):
     assert open_live(f"replay:{made.path}?camera={tmp_path / 'c.json'}").open().camera == made.camera
 
 
+def test_what_is_chosen_of_a_recording_is_chosen_of_its_replay(tmp_path, rng):
+    topics, raw = Topics(ros1=True), scene(rng, 4, WIDTH, HEIGHT)
+    messages = [
+        *depth_messages(topics, raw, "/left/depth/image_raw"),
+        *depth_messages(topics, raw[::-1], "/right/depth/image_raw"),
+    ]
+    write_ros1(tmp_path / "two.bag", messages)
+    with pytest.raises(SensorError, match="has several topics with depth, choose one"):
+        open_live(f"replay:{tmp_path / 'two.bag'}").open()
+    source = open_live(f"replay:{tmp_path / 'two.bag'}?topic=/right/depth/image_raw&unit=0.0005&speed=50")
+    assert source.open().depth_unit == 0.0005
+    first = next(capture for capture in source.captures() if capture is not None)
+    np.testing.assert_array_equal(first.raw, raw[-1])
+
+
 @pytest.mark.parametrize(
     ("uri", "said"),
     [
@@ -66,7 +82,9 @@ def test_a_folder_with_its_camera_elsewhere(tmp_path, rng):
         ("replay:x?volume=3", r"replay: has no option volume; it takes replay:\?speed=1&loop=0"),
         ("replay:x?speed", "has options that cannot be read"),
         ("replay:x?speed=1&speed=2", "gives an option twice"),
-        ("leap:", "is no live sensor; there are .*replay:SESSION"),
+        ("replay:x?size=3", "has no option size"),
+        ("leap:", r"is no live sensor; there are .*replay:SESSION\S+$"),
+        ("wave.mcap", r"A recording is played as if it were live with replay:wave\.mcap\."),
     ],
 )
 def test_mistakes_are_told(uri, said):

@@ -154,7 +154,7 @@ def test_options_that_do_not_fit_are_told(tmp_path, capsys, arguments, said):
 
 
 def test_a_live_uri_given_for_a_session_is_told(capsys):
+    assert execute(["info", "zmq://box:5555"]) == 2
+    assert "is a live sensor: 'spf record zmq://box:5555 -o FILE' records it" in capsys.readouterr().err
     assert execute(["info", "replay:sessions/open-close.mcap"]) == 2
-    assert (
-        "is a live sensor: 'spf record replay:sessions/open-close.mcap -o FILE' records it" in capsys.readouterr().err
-    )
+    assert "give the recording itself, sessions/open-close.mcap." in capsys.readouterr().err

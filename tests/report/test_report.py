@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from spf.render import Renderer
 from spf.render.process import UNAVAILABLE
 from spf.report import report_html, write_report
 from spf.report.keyframes import key_frames
-from spf.trackfile import Track, track_of
+from spf.trackfile import track_of
 from tests.made_runs import LOST, WORST, made_run, made_session
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
@@ -100,9 +101,9 @@ def test_a_run_without_frames_is_one_sentence(session, tmp_path):
 
 def test_a_session_without_a_held_hand_has_key_frames_too(session):
     track = made_run(session).track
-    nothing = Track(**{**track._asdict(), "lost": np.ones(len(track), bool)})
+    nothing = replace(track, lost=np.ones(len(track), bool))
     assert key_frames(nothing, nothing.golden) == []
-    always = Track(**{**track._asdict(), "lost": np.zeros(len(track), bool)})
+    always = replace(track, lost=np.zeros(len(track), bool))
     assert key_frames(always, np.full(len(track), np.nan))[0].row == 0
 
 

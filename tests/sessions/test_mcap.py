@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import json
 import tracemalloc
 from pathlib import Path
@@ -228,6 +229,26 @@ def test_a_conversion_that_fails_leaves_nothing(tmp_path, rng):
     with pytest.raises(SessionError, match=r"depth_7\.png is torn"):
         write_session(open_session(folder), tmp_path / "out.mcap")
     assert [path.name for path in tmp_path.iterdir()] == ["images"]
+
+
+def test_a_copy_that_fills_the_disk_leaves_nothing_and_does_not_say_that_it_did(tmp_path, rng, monkeypatch):
+    session = open_session(make_mcap(tmp_path / "s.mcap", rng).path)
+    (tmp_path / "out").mkdir()
+
+    def full(self, *_args):
+        raise self._unwritable(OSError(errno.ENOSPC, "No space left on device"))
+
+    def no_room(*_args, **_names):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    out = tmp_path / "out" / "c.mcap"
+    for owner, name, fail in ((MCAPWriter, "write", full), (Writer, "start", no_room)):
+        with monkeypatch.context() as patched:
+            patched.setattr(owner, name, fail)
+            with pytest.raises(SessionError) as told:
+                write_session(session, out)
+        assert str(told.value) == f"{out} cannot be written: No space left on device. Nothing of it was kept."
+    assert not list((tmp_path / "out").iterdir())
 
 
 def test_an_interrupted_recording_keeps_its_frames(tmp_path, rng):
