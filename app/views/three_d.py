@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import AsyncIterator, Callable
 from typing import Any
+from uuid import uuid4
 
 import panel as pn
 
@@ -60,10 +61,11 @@ class ThreeD:
     ) -> None:
         self._state, self._renderer, self._lanes, self._scene = state, renderer, lanes, scene
         self._mode, self._tab, self._sizes = mode, tab, sizes
+        group = uuid4().hex
         self.panes = {
             name: Picture(
                 on_shown=self._on_shown, on_orbit=self._on_orbit, on_pan=self._on_pan, on_reset=state.reset_view,
-                alt=alt, sizing_mode="stretch_both", margin=0,
+                alt=alt, group=group, sizing_mode="stretch_both", margin=0,
             )
             for name, alt in names.items()
         }  # fmt: skip
@@ -72,7 +74,6 @@ class ThreeD:
         self._moved = 0.0
         self._view: ViewCamera | None = None  # of the last picture
         self._drawing: asyncio.Task[None] | None = None
-        self._awaited = 0  # pictures sent to the browser that it has not shown yet
         self._asked = self._sent = self._seen = self._before = 0  # requests so far: made, sent, seen, at the last wait
         self._all_shown = asyncio.Event()
         state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
@@ -102,14 +103,12 @@ class ThreeD:
             try:
                 await asyncio.wait_for(self._all_shown.wait(), deadline - time.monotonic())
             except TimeoutError:
-                self._awaited, self._seen = 0, self._asked  # nobody is looking: go on without
+                self._seen = self._asked  # nobody is looking: go on without
 
     def _on_shown(self) -> None:
-        self._awaited = max(self._awaited - 1, 0)
-        if not self._awaited:
-            self._seen = max(self._seen, self._sent)
-            self._all_shown.set()
-            self._state.pictured += 1
+        self._seen = max(self._seen, self._sent)
+        self._all_shown.set()
+        self._state.pictured += 1
 
     def _on_orbit(self, right: float, up: float, magnify: float) -> None:
         self._moved = time.monotonic()
@@ -164,7 +163,7 @@ class ThreeD:
             self._seen = asked
             return
         pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
-        self._awaited, self._sent = len(pictures), asked
+        self._sent = asked
         with pn.io.hold():
             for name, content in pictures.items():
                 self.panes[name].image = content
