@@ -69,6 +69,7 @@ class State(param.Parameterized):
     previewed: int = param.Integer(0, doc="counts up with every preview")
     landscape_of: tuple[int, int] = param.ClassSelector(class_=tuple, default=(0, 1), doc="entries of the pose")
 
+    sending: int = param.Integer(0, doc="counts up when pictures are sent: what changes now goes in the same message")
     pictured: int = param.Integer(0, doc="counts up when the browser shows what was asked for")
     playing: bool = param.Boolean(False)
     speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")

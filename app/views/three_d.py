@@ -74,6 +74,8 @@ class ThreeD:
         self._moved = 0.0
         self._view: ViewCamera | None = None  # of the last picture
         self._drawing: asyncio.Task[None] | None = None
+        self._is_drawing = False
+        self._brought: dict[Picture, bytes] = {}
         self._asked = self._sent = self._seen = self._before = 0  # requests so far: made, sent, seen, at the last wait
         self._all_shown = asyncio.Event()
         state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
@@ -104,6 +106,17 @@ class ThreeD:
                 await asyncio.wait_for(self._all_shown.wait(), deadline - time.monotonic())
             except TimeoutError:
                 self._seen = self._asked  # nobody is looking: go on without
+
+    def bring(self, pane: Picture, content: bytes) -> None:
+        """Show another picture in one message with those being drawn, for messages are dear; at once while none is.
+
+        Args:
+            pane: that shows it, none of these.
+            content: a JPEG or PNG file.
+        """
+        self._brought[pane] = content
+        if not self._is_drawing:
+            self._send({})
 
     def _on_shown(self) -> None:
         self._seen = max(self._seen, self._sent)
@@ -143,8 +156,28 @@ class ThreeD:
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
 
     async def _draw(self, *, sharp: bool) -> None:
-        """Have each picture drawn as soon as its scene is made, while the next scene is; send all in one message."""
-        state, lanes, asked = self._state, self._lanes(), self._asked
+        """Draw and send the pictures, and what was brought meanwhile, whether they could be drawn or not."""
+        asked, pictures, self._is_drawing = self._asked, dict[Picture, bytes](), True
+        try:
+            pictures = await self._pictures(sharp=sharp)
+        finally:
+            self._is_drawing = False
+            if pictures:
+                self._sent = asked
+            else:
+                self._seen = asked
+            self._send(pictures)
+
+    def _send(self, pictures: dict[Picture, bytes]) -> None:
+        with pn.io.hold():
+            for pane, content in {**self._brought, **pictures}.items():
+                pane.image = content
+            self._brought = {}
+            self._state.sending += 1
+
+    async def _pictures(self, *, sharp: bool) -> dict[Picture, bytes]:
+        """Have each picture drawn as soon as its scene is made, while the next scene is."""
+        state, lanes = self._state, self._lanes()
         entries = {name: entry for name, lane in lanes.items() if (entry := lane.entry(state.frame)) is not None}
         with_hand = [entry for entry in entries.values() if entry.result.info is not None and entry.seen is not None]
         if with_hand:
@@ -159,14 +192,8 @@ class ThreeD:
         for name, lane in lanes.items():
             if name not in futures:
                 self.panes[name].param.update(image=b"", hint=self._hint(lane))
-        if not futures:
-            self._seen = asked
-            return
-        pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
-        self._sent = asked
-        with pn.io.hold():
-            for name, content in pictures.items():
-                self.panes[name].image = content
+        contents = await asyncio.gather(*futures.values())
+        return {self.panes[name]: content for name, content in zip(futures, contents, strict=True)}
 
     async def _scenes(self, entries: dict[str, Entry]) -> AsyncIterator[tuple[str, Scene | None]]:
         """The scenes of entries, one after the other, made beside the event loop unless they were drawn last."""
