@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable
 from typing import Any, ClassVar
 from uuid import uuid4
@@ -22,7 +23,7 @@ class Picture(JSComponent):
         on_reset: called after a double click.
     """
 
-    image: bytes = param.Bytes(b"", doc="a JPEG or PNG file, or nothing")
+    source: str = param.String("", doc="data URL of a picture, or nothing: a blob costs the browser much more")
     hint: str = param.String("", doc="what is said while there is no picture")
     alt: str = param.String("", doc="what the picture shows, for who cannot see it")
     turns: bool = param.Boolean(False, doc="whether the mouse orbits")
@@ -40,7 +41,7 @@ class Picture(JSComponent):
       const hint = document.createElement('div');
       hint.className = 'picture-hint';
       frame.append(img, hint);
-      let url = null, isLoading = false, answered = () => {};
+      let isLoading = false, answered = () => {};
       const begun = () => {
         if (isLoading || !model.group) return;
         isLoading = true;
@@ -52,30 +53,26 @@ class Picture(JSComponent):
         loading.set(model.group, loading.get(model.group) - 1);
         if (!loading.get(model.group)) model.send_msg({ kind: 'shown' });  // one answer for all: messages are dear
       };
-      const some = () => Boolean(model.image && model.image.byteLength);
       const say = () => {
-        img.style.visibility = some() ? 'visible' : 'hidden';
-        hint.style.display = some() || !model.hint ? 'none' : 'flex';
+        img.style.visibility = model.source ? 'visible' : 'hidden';
+        hint.style.display = model.source || !model.hint ? 'none' : 'flex';
         hint.textContent = model.hint;
         img.alt = model.alt;
       };
       const show = () => {
         say();
-        if (!some()) { ended(); return; }
+        if (!model.source) { ended(); return; }
         begun();
-        const old = url;
-        url = URL.createObjectURL(new Blob([model.image]));
         img.onload = img.onerror = () => {
-          if (old) URL.revokeObjectURL(old);
           frame.dataset.shown = String(Number(frame.dataset.shown || 0) + 1);
           ended();
           answered();
         };
-        img.src = url;
+        img.src = model.source;
       };
-      model.on('image', show);
+      model.on('source', show);
       model.on('hint', say);
-      model.on('remove', () => { ended(); if (url) URL.revokeObjectURL(url); });
+      model.on('remove', ended);
       show();
       if (!model.turns) return frame;
 
@@ -138,6 +135,10 @@ class Picture(JSComponent):
             params.setdefault("group", uuid4().hex)
         super().__init__(turns=on_orbit is not None, **params)
         self._shown, self._orbit, self._pan, self._reset = on_shown, on_orbit, on_pan, on_reset
+
+    def show(self, content: bytes) -> None:
+        """Show a JPEG file, or the hint where there is nothing."""
+        self.source = f"data:image/jpeg;base64,{b64encode(content).decode()}" if content else ""
 
     def _handle_msg(self, msg: dict[str, Any]) -> None:
         if msg["kind"] == "shown" and self._shown is not None:

@@ -112,7 +112,7 @@ class ThreeD:
 
         Args:
             pane: that shows it, none of these.
-            content: a JPEG or PNG file.
+            content: a JPEG file.
         """
         self._brought[pane] = content
         if not self._is_drawing:
@@ -148,7 +148,7 @@ class ThreeD:
                 await asyncio.sleep(_SETTLED)
         except RenderUnavailableError as error:
             for pane in self.panes.values():
-                pane.param.update(image=b"", hint=f"{error} {_WITHOUT}")
+                pane.param.update(source="", hint=f"{error} {_WITHOUT}")
         except RenderError as error:
             self._state.error = str(error)
         except Exception:
@@ -171,7 +171,7 @@ class ThreeD:
     def _send(self, pictures: dict[Picture, bytes]) -> None:
         with pn.io.hold():
             for pane, content in {**self._brought, **pictures}.items():
-                pane.image = content
+                pane.show(content)
             self._brought = {}
             self._state.sending += 1
 
@@ -191,7 +191,7 @@ class ThreeD:
                 futures[name] = asyncio.wrap_future(picture)
         for name, lane in lanes.items():
             if name not in futures:
-                self.panes[name].param.update(image=b"", hint=self._hint(lane))
+                self.panes[name].param.update(source="", hint=self._hint(lane))
         contents = await asyncio.gather(*futures.values())
         return {self.panes[name]: content for name, content in zip(futures, contents, strict=True)}
 

@@ -102,7 +102,7 @@ def test_the_card_connects_records_and_opens_what_was_recorded(sample, tmp_path)
         card._set_mark(None)
         assert card._note.value == ""
         await asyncio.sleep(0.3)
-        assert card._picture.image[:2] == b"\xff\xd8"  # a JPEG
+        assert card._picture.source.startswith("data:image/jpeg;base64,/9j/")
         await card._toggle_recording(None)
         assert card._reopen.visible
         await card._open_recorded(None)
