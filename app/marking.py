@@ -228,8 +228,9 @@ class Marking(param.Parameterized):
         if own == self.marks.get(index, {}):
             return
         try:
+            self._controller.allowed(str(marks_file(path_of(session))))
             kept = keep_frame(session, index, own)
-        except SessionError as error:
+        except SpfError as error:
             self.state.error = str(error)
             return
         self._of = kept, index  # the same recording: nothing that was tracked is dropped
@@ -288,6 +289,7 @@ class Marking(param.Parameterized):
         session, marks = self.session, self.marks
         path, size = path_of(session), (session.camera.width, session.camera.height)
         async with self._controller.doing("Writing the marks into the session"):
+            self._controller.allowed(str(path))
             content = marks_to_json(marks, len(session), size)
 
             def work(_report: object) -> None:

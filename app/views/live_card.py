@@ -217,6 +217,8 @@ def told(facts: LiveFacts) -> str:
             f"<span style='color:#c62828'>●</span> Recording {html.escape(recording.path.name)}: {recording.frames} frames, "
             f"{recording.seconds:.0f} s, {recording.size / 1e6:.1f} MB{lost}"
         )
-    warnings = [text for text in (facts.error, feed.message, recording.warning if recording else "") if text]
+    warnings = [
+        text for text in (facts.error, facts.warning, feed.message, recording.warning if recording else "") if text
+    ]
     lines += [f"<span class='live-warning' style='color:#b26a00'>{html.escape(text)}</span>" for text in warnings]
     return f"<div style='font:13px/1.6 Roboto,sans-serif'>{'<br>'.join(lines)}</div>"
