@@ -70,9 +70,7 @@ class State(param.Parameterized):
 
     init: str = param.Selector(default="auto", objects=list(INITS.values()))
     pose_file: str = param.String("")
-    shape: str = param.Selector(
-        default="depth", objects=["depth", "file"], doc="of the hand: what comes with the first pose, or a file"
-    )
+    shape: str = param.Selector(default="depth", objects=["depth", "file"])
     hand_file: str = param.String("")
     seed: int = param.Integer(0, bounds=(0, 2**31 - 1))
 
