@@ -45,7 +45,7 @@ class StartCard:
             label="Start", icon="play_circle", sizing_mode="stretch_width", on_click=self._on_start, margin=(10, 10)
         )
         state.param.watch(lambda event: setattr(pose_file, "visible", event.new == "file"), "init")
-        state.param.watch(lambda event: setattr(self._shape, "options", shapes_of(event.new)), "init")
+        state.param.watch(self._name_shapes, "init")
         state.param.watch(lambda event: setattr(hand_file, "visible", event.new == "file"), "shape")
         state.param.watch(self._follow, ["session", "task", "playing"])
         self._follow()
@@ -58,6 +58,10 @@ class StartCard:
     def hands(self) -> list[str]:
         """The ways to the hand's shape that are offered, in words."""
         return list(self._shape.options)
+
+    def _name_shapes(self, _event: Any) -> None:
+        self._shape.options = shapes_of(self._state.init)
+        self._shape.param.trigger("value")  # the browser shows the words of the old options otherwise
 
     async def _on_start(self, _event: Any) -> None:
         await self._start()
