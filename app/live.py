@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.folders import allowed_source
+from app.state import warning_of
 from spf.errors import SessionError, SpfError
 from spf.frame import Frame
+from spf.initialise import Doubted
 from spf.live import Feed, FeedState, Recording, open_live
 from spf.live.tracking import Request, find_live_start, follow
 from spf.progress import Report
@@ -22,6 +24,10 @@ from spf.progress import Report
 __all__ = ["Live", "LiveFacts", "LivePicture"]
 
 _LATELY = 150  # tracked frames that the latency is of
+_REMEDIES: dict[Doubted, str] = {
+    "pose": "Disconnect and connect again with an open hand before the camera.",
+    "side": "If it is the other one, disconnect, choose it under Hand shown and connect again.",
+}
 
 
 class LivePicture(NamedTuple):
@@ -49,6 +55,7 @@ class LiveFacts(NamedTuple):
         latency_ms: median and 95th percentile from capture to estimate, lately; None before the first.
         dropped: frames that were not tracked because newer ones were there.
         lost: frames tracked in which the hand was lost.
+        warning: what may be wrong with the start, or "".
         error: why nothing is tracked any more, or "".
     """
 
@@ -59,6 +66,7 @@ class LiveFacts(NamedTuple):
     latency_ms: tuple[float, float] | None
     dropped: int
     lost: int
+    warning: str
     error: str
 
 
@@ -79,7 +87,7 @@ class Live:
         self._request, self._kernels = request, kernels
         self._feed = Feed(open_live(allowed_source(uri)), wait=True).start()
         self._stop = threading.Event()
-        self._doing, self._error = "Connecting", ""
+        self._doing, self._warning, self._error = "Connecting", "", ""
         self._picture: LivePicture | None = None
         self._lately: deque[tuple[float, float]] = deque(maxlen=_LATELY)  # (when estimated, latency), s
         self._dropped = self._lost = 0
@@ -101,6 +109,7 @@ class Live:
             None if percentiles is None else (float(percentiles[0]), float(percentiles[1])),
             self._dropped,
             self._lost,
+            self._warning,
             self._error,
         )
 
@@ -149,6 +158,7 @@ class Live:
             start = find_live_start(self._feed, self._request, self._report, self._stop.is_set)
             if start is None:
                 return
+            self._warning = warning_of(start, _REMEDIES)
             for tracked in follow(self._feed, self._request, start, self._stop.is_set):
                 result = tracked.result
                 self._doing = "Lost, searching" if result.lost else "Tracking"

@@ -3,61 +3,22 @@
 from __future__ import annotations
 
 import math
-from functools import cache
-from typing import NamedTuple
 
-import numpy as np
 import param
 
 from app.controller import Controller
+from app.placing import Placing, depth_beneath, followed, mark_at, skin_offsets
 from app.state import State
 from spf.errors import SessionError, SpfError
 from spf.frame import JOINT_NAMES, Frame
-from spf.hand import load_hand
-from spf.hand.distance import distances_to_surface
-from spf.hand.kinematics import joints_of
 from spf.sessions import Mark, Marks, Session, marks_in
 from spf.sessions.marked import keep_frame, path_of
 from spf.sessions.marks import marks_file, marks_to_csv, marks_to_json
 from spf.sessions.mcap_marks import embed_marks
 
-__all__ = ["Marking", "Placing", "depth_beneath", "skin_offsets"]
+__all__ = ["Marking"]
 
-_AROUND = 2  # pixels beside a mark among which its depth is looked for
-_SAME_SURFACE = 0.04  # m that a surface may have moved from one frame to the next and still be a joint's
 _MOST_UNDONE = 200
-
-
-class Placing(NamedTuple):
-    """A joint in the making.
-
-    Attributes:
-        mark: as it is kept.
-        suggested: whether it was only taken over from another frame: nobody has looked at it here, and it is not kept.
-    """
-
-    mark: Mark
-    suggested: bool = False
-
-
-@cache
-def skin_offsets() -> dict[str, float]:
-    """Return how far the joints of the bundled hand lie under its skin, m: what a mark is put behind the surface seen."""
-    hand = load_hand("right")
-    away = distances_to_surface(joints_of(hand, hand.neutral_pose()), hand.skin.vertices, hand.faces)
-    return {name: round(float(distance), 4) for name, distance in zip(JOINT_NAMES, away, strict=True)}
-
-
-def depth_beneath(frame: Frame, u: float, v: float) -> float:
-    """Return the depth in metres of the surface seen at a pixel, the middle of its neighbours' where it has none; else 0."""
-    column, row = round(u), round(v)
-    height, width = frame.depth.shape
-    if not (0 <= row < height and 0 <= column < width):
-        return 0.0
-    if frame.depth[row, column] > 0:
-        return float(frame.depth[row, column])
-    part = frame.depth[max(row - _AROUND, 0) : row + _AROUND + 1, max(column - _AROUND, 0) : column + _AROUND + 1]
-    return float(np.median(part[part > 0])) if (part > 0).any() else 0.0
 
 
 class Marking(param.Parameterized):
@@ -132,13 +93,9 @@ class Marking(param.Parameterized):
         else:
             self.told = "There is no depth at this place: click beside it, then move the joint with the arrow keys."
             return
-        self._set(name, Placing(self._mark(frame, u, v, depth, offset)))
+        self._set(name, Placing(mark_at(frame, u, v, depth, offset)))
         if onward and not joint:
             self._choose_next()
-
-    def _mark(self, frame: Frame, u: float, v: float, depth: float, offset: float) -> Mark:
-        x, y, z = (round(float(number), 6) for number in frame.camera.back_project(u, v, depth))
-        return Mark((x, y, z), offset)
 
     def offset_of(self, joint: str) -> float:
         """Return by how much a joint is put behind the surface seen: as it was last, else as on the bundled hand; m."""
@@ -168,7 +125,7 @@ class Marking(param.Parameterized):
             return
         surface = depth_beneath(self.frame(), *at)
         if surface > 0:
-            self._set(self.chosen, Placing(self._mark(self.frame(), *at, surface + offset, offset)))
+            self._set(self.chosen, Placing(mark_at(self.frame(), *at, surface + offset, offset)))
 
     def deepen(self, metres: float) -> None:
         """Put the chosen joint farther behind the surface; one whose surface is not known just farther away."""
@@ -183,7 +140,7 @@ class Marking(param.Parameterized):
         """Put the chosen joint at a depth, m; how far that is behind a surface then is not said."""
         at = self.pixel_of(self.chosen)
         if at is not None and depth > 0:
-            self._set(self.chosen, Placing(self._mark(self.frame(), *at, depth, math.nan)))
+            self._set(self.chosen, Placing(mark_at(self.frame(), *at, depth, math.nan)))
 
     def hide(self) -> None:
         """Say that the chosen joint cannot be seen in this frame."""
@@ -228,8 +185,9 @@ class Marking(param.Parameterized):
         if own == self.marks.get(index, {}):
             return
         try:
+            self._controller.allowed(str(marks_file(path_of(session))))
             kept = keep_frame(session, index, own)
-        except SessionError as error:
+        except SpfError as error:
             self.state.error = str(error)
             return
         self._of = kept, index  # the same recording: nothing that was tracked is dropped
@@ -262,19 +220,12 @@ class Marking(param.Parameterized):
         self._controller.look(index + 1)
         if not self.joints and before:
             frame = self.frame()
-            guessed = {name: Placing(self._followed(frame, placing.mark), True) for name, placing in before.items()}
+            guessed = {name: Placing(followed(frame, placing.mark), True) for name, placing in before.items()}
             self.param.update(
                 joints=guessed,
                 told="Taken over from the frame before: move each to its place, or keep them as they are.",
             )
             self._choose_next()
-
-    def _followed(self, frame: Frame, mark: Mark) -> Mark:
-        if mark.point is None or math.isnan(mark.offset):
-            return mark
-        u, v = (float(number) for number in frame.camera.project(mark.point))
-        depth = depth_beneath(frame, u, v) + mark.offset
-        return self._mark(frame, u, v, depth, mark.offset) if abs(depth - mark.point[2]) < _SAME_SURFACE else mark
 
     # ---- given away
 
@@ -288,6 +239,7 @@ class Marking(param.Parameterized):
         session, marks = self.session, self.marks
         path, size = path_of(session), (session.camera.width, session.camera.height)
         async with self._controller.doing("Writing the marks into the session"):
+            self._controller.allowed(str(path))
             content = marks_to_json(marks, len(session), size)
 
             def work(_report: object) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -11,10 +10,11 @@ import param
 
 from app.controller import Controller
 from app.placed import Placed, with_part
+from app.pose_files import file_of, keep_pose
 from app.state import State
 from spf.errors import HandError, StartError
 from spf.frame import Frame
-from spf.hand import HandShape, SavedPose, read_pose, write_pose
+from spf.hand import HandShape, SavedPose
 from spf.hand.handles import Stance, dragged, turned_home
 from spf.hand.model import Side
 from spf.lens import seen_through
@@ -270,13 +270,13 @@ class Posing(param.Parameterized):
 
     def file_of_pose(self) -> tuple[str, bytes]:
         """Return name and content of a file for ``spf track --init FILE``."""
-        return f"{self._name()}-pose.json", _encoded(self.saved().to_dict())
+        return file_of(f"{self._name()}-pose", self.saved().to_dict())
 
     def file_of_hand(self) -> tuple[str, bytes]:
         """Return name and content of a file for ``spf track --hand FILE``."""
         shape = self.saved().shape
         assert shape is not None
-        return f"{self._name()}-hand.json", _encoded(shape.to_dict())
+        return file_of(f"{self._name()}-hand", shape.to_dict())
 
     def _name(self) -> str:
         assert self.state.session is not None
@@ -285,24 +285,9 @@ class Posing(param.Parameterized):
     def use(self) -> None:
         """Have Start begin here: keep the pose in a file of its own, and choose that as first pose."""
         try:
-            path = self._free(self._folder / "poses")
-            write_pose(self.saved(), path)
-            read_pose(path)
+            path = keep_pose(self.saved(), self._folder / "poses", self._name())
         except (StartError, HandError) as error:
             self.state.error = str(error)
             return
         self.state.param.update(init="file", pose_file=str(path), shape="depth", error="")
         self.told = f"Start begins at frame {self.state.frame} with this pose and hand ({path.name}): press Start."
-
-    def _free(self, folder: Path) -> Path:
-        """A path that no file has yet: poses that runs began with are never written over."""
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise HandError(f"The folder {folder} for poses cannot be made: {error.strerror}.") from None
-        names = (f"{self._name()}{f'-{number}' if number > 1 else ''}.json" for number in range(1, 10**6))
-        return next(folder / name for name in names if not (folder / name).exists())
-
-
-def _encoded(content: object) -> bytes:
-    return (json.dumps(content, indent=2) + "\n").encode()

@@ -28,6 +28,10 @@ __all__ = ["Landscape", "Preview", "Previewer"]
 _CELLS = 19  # of the landscape along each side
 _LEAST_REACH = {True: 0.01, False: 0.12}  # m and rad that the landscape shows at least beside the estimate
 _ROOM = 1.25  # beyond the samples
+_DRAWN = (
+    "With weighting laplace the samples are drawn anew around the optima that the settings lead to, so that weights and estimate "
+    "are those of a re-run: press This frame again. The cost below is that of the settings as they are now."
+)
 _PICTURES_FIRST = 0.4  # s that the pictures of a new frame have the machine for themselves
 
 
@@ -156,7 +160,7 @@ def _preview(job: _Job, observation: Observation) -> Preview:
         changed = {name for name, value in now.items() if value != was[name]}
         later = sorted(changed - SEEN_AT_ONCE)
         if "weighting" in changed or getattr(settings, "weighting", "") == "laplace":
-            note = "What a setting does to drawn samples (weighting laplace) is seen when the frame is tracked again."
+            note = _DRAWN
         else:
             interval = max(observation.time - base.before.filter.time, 1e-3)
             rng = np.random.default_rng([how.seed, base.result.index])

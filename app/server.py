@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import panel as pn
 
-from app.folders import SAMPLES, allowed_session
+from app.folders import SAMPLES, allowed, allowed_session
 from app.kernels import Kernels
 from spf.progress import Report, silent
 from spf.render import Renderer
@@ -45,12 +45,13 @@ def open_shared(uri: str, camera: str | None, report: Report = silent) -> Sessio
     """Open a session once for all pages; a file that changed, or whose marks did, is opened again.
 
     Raises:
-        OutsideError: it is in none of the folders that a page may open.
+        OutsideError: it, or the marks beside it, are in none of the folders that a page may open.
         SessionError: see :func:`spf.sessions.open_session`.
     """
     uri, camera = allowed_session(uri, camera)
     path, _ = split_uri(uri)
-    stamp = [file.stat().st_mtime_ns for file in (path, marks_file(path)) if file.exists()]
+    files = [file for file in (path, marks_file(path)) if file.exists()]
+    stamp = [allowed(file).stat().st_mtime_ns for file in files]
     session: Session = pn.state.as_cached(
         f"session {uri} {camera} {stamp}", lambda: open_session(uri, camera, report), ttl=_KEPT
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import param
@@ -15,11 +16,15 @@ from spf.learned.network import available_network
 from spf.sessions import Session
 from spf.trackers import TRACKERS
 
-__all__ = ["COLOURS", "INITS", "MODES", "SHAPES", "State", "warning_of"]
+__all__ = ["COLOURS", "INITS", "MODES", "State", "shapes_of", "warning_of"]
 
-#: Ways to the first pose and to the hand's shape, by the words of the page.
+#: Ways to the first pose, by the words of the page.
 INITS = {"Find it automatically": "auto", "Take it from the truth": "truth", "Read a pose file": "file"}
-SHAPES = {"Calibrate it from the depth": "depth", "Read a hand file": "file"}
+_OWN_SHAPES = {
+    "auto": "Calibrate it from the depth",
+    "truth": "That of the truth, if it has one",
+    "file": "That of the pose file, if it has one",
+}
 
 #: What the page shows: one tracker with all its particles, several beside each other, or the method explained.
 MODES = {"One tracker": "one", "Compare": "compare", "Help": "help"}
@@ -34,9 +39,19 @@ _REMEDIES: dict[Doubted, str] = {
 }
 
 
-def warning_of(start: Start) -> str:
-    """Return what may be wrong with a start and what to do about it, or "" where all is believed."""
-    doubt = "" if start.doubted is None else f"{start.doubt} {_REMEDIES[start.doubted]}"
+def shapes_of(init: str) -> dict[str, str]:
+    """Return the ways to the hand's shape, by the words of the page, with a way to the first pose."""
+    return {_OWN_SHAPES[init]: "depth", "Read a hand file": "file"}
+
+
+def warning_of(start: Start, remedies: Mapping[Doubted, str] = _REMEDIES) -> str:
+    """Return what may be wrong with a start and what to do about it, or "" where all is believed.
+
+    Args:
+        start: of a run.
+        remedies: what to do about each thing that may be wrong.
+    """
+    doubt = "" if start.doubted is None else f"{start.doubt} {remedies[start.doubted]}"
     return " ".join(text for text in (doubt, start.remark) if text)
 
 
@@ -55,7 +70,7 @@ class State(param.Parameterized):
 
     init: str = param.Selector(default="auto", objects=list(INITS.values()))
     pose_file: str = param.String("")
-    shape: str = param.Selector(default="depth", objects=list(SHAPES.values()))
+    shape: str = param.Selector(default="depth", objects=["depth", "file"])
     hand_file: str = param.String("")
     seed: int = param.Integer(0, bounds=(0, 2**31 - 1))
 
@@ -69,6 +84,7 @@ class State(param.Parameterized):
     previewed: int = param.Integer(0, doc="counts up with every preview")
     landscape_of: tuple[int, int] = param.ClassSelector(class_=tuple, default=(0, 1), doc="entries of the pose")
 
+    sending: int = param.Integer(0, doc="counts up when pictures are sent: what changes now goes in the same message")
     pictured: int = param.Integer(0, doc="counts up when the browser shows what was asked for")
     playing: bool = param.Boolean(False)
     speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")

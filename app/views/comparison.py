@@ -46,7 +46,7 @@ class Comparison:
             colour: card(self.pictures.panes[colour], self._heads[colour], _HAND_HEIGHT, least_width=220)
             for colour in COLOURS
         }
-        depth, table, difference = Depth(state, "compare"), Table(state), Difference(state)
+        depth, table, difference = Depth(state, self.pictures, "compare"), Table(state), Difference(state)
         error, *others = [Curves(state, q, "compare") for q in (ERROR, GOLDEN, OVERLAP, ESS, MILLISECONDS)]
         middle = (
             card(depth.pane, heading("Depth", ("●", BEFORE, "truth")), _DEPTH_HEIGHT, truth_switch(state)),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from app.results import Seen
 from app.state import State
 from app.views.picture import Picture
+from app.views.three_d import ThreeD
 from spf.errors import SessionError
 from spf.frame import Frame
 from spf.render import Skeleton, depth_picture
@@ -27,10 +28,16 @@ _TRUTH = tuple(round(255 * part) for part in PREDICTED)
 
 
 class Depth:
-    """The pane, with the skeleton of every lane shown; drawn beside the event loop, the newest wins."""
+    """The pane, with the skeleton of every lane shown; drawn beside the event loop, the newest wins.
 
-    def __init__(self, state: State, mode: str = "one") -> None:
-        self._state, self._mode = state, mode
+    Args:
+        state: of the page.
+        pictures: that are seen beside it, and come in the same message.
+        mode: of the page that it is seen in.
+    """
+
+    def __init__(self, state: State, pictures: ThreeD, mode: str = "one") -> None:
+        self._state, self._pictures, self._mode = state, pictures, mode
         self._wanted = False
         self._drawing: asyncio.Task[None] | None = None
         self.pane = Picture(
@@ -52,7 +59,7 @@ class Depth:
         while self._wanted:
             self._wanted = False
             try:
-                self.pane.image = await asyncio.to_thread(self._work())
+                self._pictures.bring(self.pane, await asyncio.to_thread(self._work()))
             except SessionError as error:
                 self._state.error = str(error)
 

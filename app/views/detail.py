@@ -89,7 +89,7 @@ class Overview:
             state, renderer, "one", PICTURES, lambda: dict.fromkeys(PICTURES, state.lane),
             lambda name, entry, shown: SCENES[name](entry, shown.selected),
         )  # fmt: skip
-        depth = Depth(state)
+        depth = Depth(state, self.pictures)
         keys = ("●", "white", "estimate"), ("●", BEFORE, "truth")
         now: list[Any] = [Costs(state), Weights(state)]
         over: list[Any] = [Curves(state, ERROR), Curves(state, ESS), Fit(state)]

@@ -12,7 +12,6 @@ from app.state import State
 
 __all__ = ["Follower"]
 
-_EVERY = 1.0  # s between two redraws while frames go by: playing, or tracked in the background
 _PICTURES_FIRST = 400  # ms that the plots wait at most for the pictures of a frame, which are looked at first
 
 
@@ -28,6 +27,9 @@ class Follower(ABC):
 
     #: Tab of the page of one tracker that it is seen in.
     tab: ClassVar[str] = "overview"
+
+    #: Seconds between two redraws while frames go by: playing, or tracked in the background.
+    every: ClassVar[float] = 1.5
 
     def __init__(
         self, state: State, mode: str | None = "one", also: tuple[str, ...] = (), look: tuple[str, ...] = ()
@@ -45,7 +47,7 @@ class Follower(ABC):
         if self._mode is not None and (self.state.mode != self._mode or hidden):
             return
         now = time.monotonic()
-        if (self.state.playing or self.state.task) and now - self._drawn < _EVERY:
+        if (self.state.playing or self.state.task) and now - self._drawn < self.every:
             self._is_behind = True
             return  # the next frame comes soon, and the end of playing or of the task redraws in any case
         self._drawn, self._is_behind = now, False

@@ -78,7 +78,7 @@ class Help:
             state, renderer, "help", names, lambda: dict.fromkeys(names, state.lane),
             lambda name, entry, *_shown: SCENES[name](entry, ()),
         )  # fmt: skip
-        depth = Depth(state, "help")
+        depth = Depth(state, self.pictures, "help")
         shown: dict[str, Any] = {"depth": depth.pane, **self.pictures.panes}
         titles = {"depth": "Depth", **PICTURES}
         rows = [

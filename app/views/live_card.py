@@ -104,7 +104,7 @@ class LiveCard:
             self._state.error = str(error)
             return
         self._state.param.update(error="", playing=False)
-        self._picture.image = b""
+        self._picture.show(b"")
         self._lay_out()
         asyncio.ensure_future(self._show(self.live))  # noqa: RUF006 - it ends with the connection
 
@@ -185,7 +185,7 @@ class LiveCard:
                 skeletons = [] if picture.joints is None else [Skeleton(picture.joints, _ESTIMATE)]
                 image = await asyncio.to_thread(depth_jpeg, picture.frame, None, skeletons)
                 self._shown.clear()
-                self._picture.image = image
+                self._picture.show(image)
                 try:
                     await asyncio.wait_for(self._shown.wait(), 1.0)
                 except TimeoutError:
@@ -217,6 +217,8 @@ def told(facts: LiveFacts) -> str:
             f"<span style='color:#c62828'>●</span> Recording {html.escape(recording.path.name)}: {recording.frames} frames, "
             f"{recording.seconds:.0f} s, {recording.size / 1e6:.1f} MB{lost}"
         )
-    warnings = [text for text in (facts.error, feed.message, recording.warning if recording else "") if text]
+    warnings = [
+        text for text in (facts.error, facts.warning, feed.message, recording.warning if recording else "") if text
+    ]
     lines += [f"<span class='live-warning' style='color:#b26a00'>{html.escape(text)}</span>" for text in warnings]
     return f"<div style='font:13px/1.6 Roboto,sans-serif'>{'<br>'.join(lines)}</div>"

@@ -11,7 +11,6 @@ import panel_material_ui as pmu
 
 from app.marking import Marking
 from app.views.download import Download
-from app.views.plots import CALM
 from spf.errors import SpfError
 from spf.frame import JOINT_NAMES
 from spf.sessions.marks import count_marks
@@ -19,7 +18,7 @@ from spf.sessions.marks import count_marks
 __all__ = ["MarkControls"]
 
 _ROWS = ("wrist", "thumb", "index", "middle", "ring", "little")
-_COLOURS = {"unset": "light", "marked": "success", "suggested": "warning", "hidden": "default"}
+_COLOURS = {"unset": "default", "marked": "success", "suggested": "warning", "hidden": "default"}
 _SMALL = {"minWidth": "0", "textTransform": "none", "padding": "1px 4px"}
 
 
@@ -167,5 +166,5 @@ class MarkControls:
 
 def _told(words: str, more: str) -> str:
     ink = "color:var(--panel-on-background-color,#2a3038)"
-    added = f"<br><span style='color:{CALM}'>{more}</span>" if more else ""
+    added = f"<br><span style='opacity:0.8'>{more}</span>" if more else ""
     return f"<div class='marks-told' style='font:12.5px/1.45 Roboto,sans-serif;{ink}'>{words}{added}</div>"

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable
 from typing import Any, ClassVar
+from uuid import uuid4
 
 import param
 from panel.custom import JSComponent
@@ -12,42 +14,65 @@ __all__ = ["Picture"]
 
 
 class Picture(JSComponent):
-    """Shows an encoded picture; reports when it is on the screen, and how the mouse wants to turn it."""
+    """Shows an encoded picture; reports when it is on the screen, and how the mouse wants to turn it.
 
-    image: bytes = param.Bytes(b"", doc="a JPEG or PNG file, or nothing")
+    Args:
+        on_shown: called when a new picture is on the screen, or all those of its ``group`` that came with it.
+        on_orbit: called with angles in radians to the right and up, and a factor of magnification.
+        on_pan: called with a way to the right and up, in heights of the picture.
+        on_reset: called after a double click.
+    """
+
+    source: str = param.String("", doc="data URL of a picture, or nothing: a blob costs the browser much more")
     hint: str = param.String("", doc="what is said while there is no picture")
     alt: str = param.String("", doc="what the picture shows, for who cannot see it")
     turns: bool = param.Boolean(False, doc="whether the mouse orbits")
+    group: str = param.String(
+        "", doc='of the pictures that are sent together, and answered together; "" is not answered'
+    )
 
     _esm = """
-    export function render({ model, el }) {
+    const loading = new Map();  // group → how many of its pictures are on their way to the screen
+
+    export function render({ model }) {
       const frame = document.createElement('div');
       frame.className = 'picture-frame';
       const img = document.createElement('img');
       const hint = document.createElement('div');
       hint.className = 'picture-hint';
       frame.append(img, hint);
-      let url = null, answered = () => {};
-      const show = () => {
-        const bytes = model.image;
-        const some = bytes && bytes.byteLength > 0;
-        img.style.visibility = some ? 'visible' : 'hidden';
-        hint.style.display = some || !model.hint ? 'none' : 'flex';
+      let isLoading = false, answered = () => {};
+      const begun = () => {
+        if (isLoading || !model.group) return;
+        isLoading = true;
+        loading.set(model.group, (loading.get(model.group) || 0) + 1);
+      };
+      const ended = () => {
+        if (!isLoading) return;
+        isLoading = false;
+        loading.set(model.group, loading.get(model.group) - 1);
+        if (!loading.get(model.group)) model.send_msg({ kind: 'shown' });  // one answer for all: messages are dear
+      };
+      const say = () => {
+        img.style.visibility = model.source ? 'visible' : 'hidden';
+        hint.style.display = model.source || !model.hint ? 'none' : 'flex';
         hint.textContent = model.hint;
         img.alt = model.alt;
-        if (!some) { model.send_msg({ kind: 'shown' }); return; }
-        const old = url;
-        url = URL.createObjectURL(new Blob([bytes]));
-        img.onload = () => {
-          if (old) URL.revokeObjectURL(old);
+      };
+      const show = () => {
+        say();
+        if (!model.source) { ended(); return; }
+        begun();
+        img.onload = img.onerror = () => {
           frame.dataset.shown = String(Number(frame.dataset.shown || 0) + 1);
-          model.send_msg({ kind: 'shown' });
+          ended();
           answered();
         };
-        img.src = url;
+        img.src = model.source;
       };
-      model.on('image', show);
-      model.on('hint', show);
+      model.on('source', show);
+      model.on('hint', say);
+      model.on('remove', ended);
       show();
       if (!model.turns) return frame;
 
@@ -86,8 +111,9 @@ class Picture(JSComponent):
     _stylesheets: ClassVar[list[str]] = [
         """
         :host { display: block; }
+        /* A layer of its own: a new picture has nothing else laid out or painted anew. */
         .picture-frame { position: relative; width: 100%; height: 100%; background: #2a3038; border-radius: 6px;
-                         overflow: hidden; touch-action: none; }
+                         overflow: hidden; touch-action: none; contain: strict; will-change: transform; }
         .picture-frame.turns { cursor: grab; }
         .picture-frame.turns:active { cursor: grabbing; }
         .picture-frame img { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain;
@@ -105,8 +131,14 @@ class Picture(JSComponent):
         on_reset: Callable[[], None] | None = None,
         **params: Any,
     ) -> None:
+        if on_shown is not None:
+            params.setdefault("group", uuid4().hex)
         super().__init__(turns=on_orbit is not None, **params)
         self._shown, self._orbit, self._pan, self._reset = on_shown, on_orbit, on_pan, on_reset
+
+    def show(self, content: bytes) -> None:
+        """Show a JPEG file, or the hint where there is nothing."""
+        self.source = f"data:image/jpeg;base64,{b64encode(content).decode()}" if content else ""
 
     def _handle_msg(self, msg: dict[str, Any]) -> None:
         if msg["kind"] == "shown" and self._shown is not None:

@@ -74,6 +74,8 @@ class Plot(Follower):
 class FramePlot(Plot):
     """A plot over the frames of the session, with a line at the one shown."""
 
+    every = 3.0  # it changes little from frame to frame, and the time line says where we are
+
     def __init__(self, state: State, plot: figure, title: str, mode: str = "one", also: tuple[str, ...] = ()) -> None:
         super().__init__(state, plot, title, mode, also)
         self._here = Span(location=0, dimension="height", line_color="#9aa4ae", line_width=1)

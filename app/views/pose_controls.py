@@ -12,7 +12,6 @@ import panel_material_ui as pmu
 from app.posing import Posing
 from app.views.download import Download
 from app.views.entries import axis_label, in_units
-from app.views.plots import CALM
 from spf.errors import SpfError
 from spf.hand.handles import entries_of
 from spf.hand.model import FINGERS
@@ -88,8 +87,9 @@ class PoseControls:
     def _slider(self, entry: int) -> pmu.FloatSlider:
         low, high = _PALM_ENDS[entry] if entry < 6 else self._limits(entry)
         slider = pmu.FloatSlider(
-            label=axis_label(entry), value=0.5 * (low + high), start=low, end=high, step=1.0 if entry < 6 else 0.5, size="small",
-            sizing_mode="stretch_width", margin=(2, 16, 0, 12), description=_TURNS if 3 <= entry < 6 else "",
+            label=axis_label(entry), value=0.5 * (low + high), start=low, end=high, step=1.0 if entry < 6 else 0.5,
+            format="0.0", size="small", sizing_mode="stretch_width", margin=(2, 16, 0, 12),
+            description=_TURNS if 3 <= entry < 6 else "",
         )  # fmt: skip
         slider.param.watch(partial(self._moved, entry), "value")
         return slider
@@ -136,6 +136,6 @@ class PoseControls:
                 f"Frame {posing.state.frame}: silhouettes overlap by <b>{100 * overlap:.0f} %</b>, golden energy "
                 f"<b>{golden:.2f}</b> (0 explains all)."
             )
-        told = f"<br><span style='color:{CALM}'>{posing.told}</span>" if posing.told else ""
+        told = f"<br><span style='opacity:0.8'>{posing.told}</span>" if posing.told else ""
         ink = "color:var(--panel-on-background-color,#2a3038)"
         return f"<div class='pose-told' style='font:12.5px/1.45 Roboto,sans-serif;{ink}'>{words}{told}</div>"

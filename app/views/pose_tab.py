@@ -13,7 +13,7 @@ from app.posing import Posing
 from app.views.follower import Follower
 from app.views.grid import card
 from app.views.overlay import BEHIND, IN_FRONT, focus_of, overlay_of, picture_of
-from app.views.plots import CALM, heading
+from app.views.plots import heading
 from app.views.pose_controls import PoseControls
 from app.views.shape_controls import ShapeControls
 from app.views.sheet import Sheet
@@ -121,4 +121,5 @@ class PoseTab(Follower):
 
 def noted(words: str) -> str:
     """Return a line under a picture as HTML."""
-    return f"<div style='font:12px/1.4 Roboto,sans-serif;color:{CALM}'>{words}</div>"
+    ink = "color:var(--panel-on-background-color,#2a3038);opacity:0.8"
+    return f"<div style='font:12px/1.4 Roboto,sans-serif;{ink}'>{words}</div>"

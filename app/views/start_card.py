@@ -7,7 +7,7 @@ from typing import Any
 
 import panel_material_ui as pmu
 
-from app.state import INITS, SHAPES, State
+from app.state import INITS, State, shapes_of
 
 __all__ = ["StartCard"]
 
@@ -27,8 +27,8 @@ class StartCard:
             visible=False,
             sizing_mode="stretch_width",
         )
-        shape = pmu.Select.from_param(
-            state.param.shape, label="Hand", options=SHAPES, size="small", sizing_mode="stretch_width"
+        self._shape = pmu.Select.from_param(
+            state.param.shape, label="Hand", options=shapes_of(state.init), size="small", sizing_mode="stretch_width"
         )
         hand_file = pmu.TextInput.from_param(
             state.param.hand_file,
@@ -45,13 +45,23 @@ class StartCard:
             label="Start", icon="play_circle", sizing_mode="stretch_width", on_click=self._on_start, margin=(10, 10)
         )
         state.param.watch(lambda event: setattr(pose_file, "visible", event.new == "file"), "init")
+        state.param.watch(self._name_shapes, "init")
         state.param.watch(lambda event: setattr(hand_file, "visible", event.new == "file"), "shape")
         state.param.watch(self._follow, ["session", "task", "playing"])
         self._follow()
         self.panel = pmu.Column(
-            self._init, pose_file, shape, hand_file, pmu.Row(seed, self._button, sizing_mode="stretch_width"),
+            self._init, pose_file, self._shape, hand_file, pmu.Row(seed, self._button, sizing_mode="stretch_width"),
             sizing_mode="stretch_width",
         )  # fmt: skip
+
+    @property
+    def hands(self) -> list[str]:
+        """The ways to the hand's shape that are offered, in words."""
+        return list(self._shape.options)
+
+    def _name_shapes(self, _event: Any) -> None:
+        self._shape.options = shapes_of(self._state.init)
+        self._shape.param.trigger("value")  # the browser shows the words of the old options otherwise
 
     async def _on_start(self, _event: Any) -> None:
         await self._start()

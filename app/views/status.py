@@ -28,7 +28,7 @@ class Status:
             margin=(2, 8), sx=_LIGHT,
         )  # fmt: skip
         state.param.watch(self._follow, ["task", "share", "left", "preparing"])
-        self.panel = pmu.Row(self._text, self._bar, self._stop, visible=False, margin=0)
+        self.panel = pmu.Row(self._text, self._bar, self._stop, visible=False, margin=(6, 0, 0, 0))
         self._follow()
 
     def _follow(self, *_events: Any) -> None:

@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import AsyncIterator, Callable
 from typing import Any
+from uuid import uuid4
 
 import panel as pn
 
@@ -60,10 +61,11 @@ class ThreeD:
     ) -> None:
         self._state, self._renderer, self._lanes, self._scene = state, renderer, lanes, scene
         self._mode, self._tab, self._sizes = mode, tab, sizes
+        group = uuid4().hex
         self.panes = {
             name: Picture(
                 on_shown=self._on_shown, on_orbit=self._on_orbit, on_pan=self._on_pan, on_reset=state.reset_view,
-                alt=alt, sizing_mode="stretch_both", margin=0,
+                alt=alt, group=group, sizing_mode="stretch_both", margin=0,
             )
             for name, alt in names.items()
         }  # fmt: skip
@@ -72,7 +74,8 @@ class ThreeD:
         self._moved = 0.0
         self._view: ViewCamera | None = None  # of the last picture
         self._drawing: asyncio.Task[None] | None = None
-        self._awaited = 0  # pictures sent to the browser that it has not shown yet
+        self._is_drawing = False
+        self._brought: dict[Picture, bytes] = {}
         self._asked = self._sent = self._seen = self._before = 0  # requests so far: made, sent, seen, at the last wait
         self._all_shown = asyncio.Event()
         state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
@@ -102,14 +105,23 @@ class ThreeD:
             try:
                 await asyncio.wait_for(self._all_shown.wait(), deadline - time.monotonic())
             except TimeoutError:
-                self._awaited, self._seen = 0, self._asked  # nobody is looking: go on without
+                self._seen = self._asked  # nobody is looking: go on without
+
+    def bring(self, pane: Picture, content: bytes) -> None:
+        """Show another picture in one message with those being drawn, for messages are dear; at once while none is.
+
+        Args:
+            pane: that shows it, none of these.
+            content: a JPEG file.
+        """
+        self._brought[pane] = content
+        if not self._is_drawing:
+            self._send({})
 
     def _on_shown(self) -> None:
-        self._awaited = max(self._awaited - 1, 0)
-        if not self._awaited:
-            self._seen = max(self._seen, self._sent)
-            self._all_shown.set()
-            self._state.pictured += 1
+        self._seen = max(self._seen, self._sent)
+        self._all_shown.set()
+        self._state.pictured += 1
 
     def _on_orbit(self, right: float, up: float, magnify: float) -> None:
         self._moved = time.monotonic()
@@ -136,7 +148,7 @@ class ThreeD:
                 await asyncio.sleep(_SETTLED)
         except RenderUnavailableError as error:
             for pane in self.panes.values():
-                pane.param.update(image=b"", hint=f"{error} {_WITHOUT}")
+                pane.param.update(source="", hint=f"{error} {_WITHOUT}")
         except RenderError as error:
             self._state.error = str(error)
         except Exception:
@@ -144,8 +156,28 @@ class ThreeD:
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
 
     async def _draw(self, *, sharp: bool) -> None:
-        """Have each picture drawn as soon as its scene is made, while the next scene is; send all in one message."""
-        state, lanes, asked = self._state, self._lanes(), self._asked
+        """Draw and send the pictures, and what was brought meanwhile, whether they could be drawn or not."""
+        asked, pictures, self._is_drawing = self._asked, dict[Picture, bytes](), True
+        try:
+            pictures = await self._pictures(sharp=sharp)
+        finally:
+            self._is_drawing = False
+            if pictures:
+                self._sent = asked
+            else:
+                self._seen = asked
+            self._send(pictures)
+
+    def _send(self, pictures: dict[Picture, bytes]) -> None:
+        with pn.io.hold():
+            for pane, content in {**self._brought, **pictures}.items():
+                pane.show(content)
+            self._brought = {}
+            self._state.sending += 1
+
+    async def _pictures(self, *, sharp: bool) -> dict[Picture, bytes]:
+        """Have each picture drawn as soon as its scene is made, while the next scene is."""
+        state, lanes = self._state, self._lanes()
         entries = {name: entry for name, lane in lanes.items() if (entry := lane.entry(state.frame)) is not None}
         with_hand = [entry for entry in entries.values() if entry.result.info is not None and entry.seen is not None]
         if with_hand:
@@ -159,15 +191,9 @@ class ThreeD:
                 futures[name] = asyncio.wrap_future(picture)
         for name, lane in lanes.items():
             if name not in futures:
-                self.panes[name].param.update(image=b"", hint=self._hint(lane))
-        if not futures:
-            self._seen = asked
-            return
-        pictures = dict(zip(futures, await asyncio.gather(*futures.values()), strict=True))
-        self._awaited, self._sent = len(pictures), asked
-        with pn.io.hold():
-            for name, content in pictures.items():
-                self.panes[name].image = content
+                self.panes[name].param.update(source="", hint=self._hint(lane))
+        contents = await asyncio.gather(*futures.values())
+        return {self.panes[name]: content for name, content in zip(futures, contents, strict=True)}
 
     async def _scenes(self, entries: dict[str, Entry]) -> AsyncIterator[tuple[str, Scene | None]]:
         """The scenes of entries, one after the other, made beside the event loop unless they were drawn last."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import math
 from collections.abc import Callable
@@ -22,6 +23,7 @@ from app.views.time_line import TimeLine
 __all__ = ["Transport", "ranges"]
 
 _ROOM = 1.1  # of the chart above its highest value
+_PICTURES_FIRST = 0.1  # s that the time line waits for the pictures of a frame that is played, to come in one message
 _USUAL = 97.0  # percentage of the values that the chart has to hold
 
 
@@ -33,10 +35,11 @@ class Transport(Follower):
         self._controller = controller
         self.line = TimeLine(self._wish, sizing_mode="stretch_width", margin=(4, 10, 6, 10))
         self.panel = pmu.Column(self.line, sizing_mode="stretch_width", margin=0)
+        self._late: asyncio.TimerHandle | None = None  # points at the latest
+        state.param.watch(self._moved, ["frame", "revision"])
         state.param.watch(
             self._point,
-            ["session", "frame", "revision", "task", "playing", "origin", "mode", "lanes", "lane", "span", "loop",
-             "speed", "dark"],
+            ["sending", "session", "task", "playing", "origin", "mode", "lanes", "lane", "span", "loop", "speed", "dark"],
         )  # fmt: skip
         self._point()
         self.draw()
@@ -64,9 +67,19 @@ class Transport(Follower):
 
     # ---- what the state says
 
+    def _moved(self, *_events: Any) -> None:
+        """Point at the frame at once; while playing together with its pictures, if they come soon."""
+        if not self.state.playing:
+            self._point()
+        elif self._late is None:
+            self._late = asyncio.get_running_loop().call_later(_PICTURES_FIRST, self._point)
+
     def _point(self, *_events: Any) -> None:
         """Say where we are and what can be done: at every frame."""
         state = self.state
+        if self._late is not None:
+            self._late.cancel()
+            self._late = None
         self.line.param.update(
             count=0 if state.session is None else len(state.session), frame=state.frame, playing=state.playing,
             span=list(state.span), loop=state.loop, speed=state.speed, can=self._possible(), readout=self._readout(),

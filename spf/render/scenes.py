@@ -128,22 +128,23 @@ def reconstruction_scene(
     if points is None:
         return Scene(meshes=(hand,))
     xyz = np.asarray(points, dtype=np.float32)
-    colours = np.asarray(OBSERVED) * _relief(xyz)
+    thin = _thin(len(xyz))
+    drawn = xyz[thin]
+    plain: NDArray[np.float64] = np.asarray(OBSERVED)
     if residuals is not None:
         far = np.asarray(residuals, dtype=np.float64)
         if far.shape != xyz.shape[:1] or not np.isfinite(far).all():
             raise ValueError(f"residuals have shape {far.shape}, expected ({len(xyz)},), all finite")
-        colours = gradient(OBSERVED, RESIDUAL, far / RESIDUAL_FULL) * _relief(xyz)
-    thin = _thin(len(xyz))
-    return Scene(meshes=(hand,), points=(Points(xyz[thin], colours[thin], size=2.0),))
+        plain = gradient(OBSERVED, RESIDUAL, far[thin] / RESIDUAL_FULL)
+    return Scene(meshes=(hand,), points=(Points(drawn, plain * _relief(drawn), size=2.0),))
 
 
 def _backdrop(points: ArrayLike | None) -> tuple[Points, ...]:
     if points is None:
         return ()
     xyz = np.asarray(points, dtype=np.float32)
-    thin = _thin(len(xyz))
-    return (Points(xyz[thin], (np.asarray(FAINT) * _relief(xyz))[thin], size=2.0),)
+    drawn = xyz[_thin(len(xyz))]
+    return (Points(drawn, np.asarray(FAINT) * _relief(drawn), size=2.0),)
 
 
 def _thin(count: int) -> NDArray[np.bool_]:

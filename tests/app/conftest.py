@@ -8,21 +8,11 @@ from app.controller import Controller
 from app.runner import Runner
 from app.server import bundled
 from app.state import State
-from tests.app.test_browser import serving
+from tests.app.test_browser import make_server, make_shelf
 
-
-@pytest.fixture(scope="session")
-def shelf(tmp_path_factory):
-    """The folder of the runs of the server that the browser tests share."""
-    return tmp_path_factory.mktemp("runs")
-
-
-@pytest.fixture(scope="session")
-def server(tmp_path_factory, shelf):
-    """The address of a server that the browser tests share, and its log so far."""
-    log = tmp_path_factory.mktemp("server") / "log"
-    with serving(log, shelf) as address:
-        yield address, log
+# The browser tests share a server; a module whose runs must be nobody else's makes one of its own from the same functions.
+shelf = pytest.fixture(scope="session", name="shelf")(make_shelf)
+server = pytest.fixture(scope="session", name="server")(make_server)
 
 
 @pytest.fixture

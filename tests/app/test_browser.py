@@ -52,6 +52,18 @@ def serving(log, runs, *options, **variables):
             process.wait(60)
 
 
+def make_shelf(tmp_path_factory):
+    """The folder of a server's runs."""
+    return tmp_path_factory.mktemp("runs")
+
+
+def make_server(tmp_path_factory, shelf):
+    """The address of a server, and its log so far."""
+    log = tmp_path_factory.mktemp("server") / "log"
+    with serving(log, shelf) as address:
+        yield address, log
+
+
 def _wait_for(address, process):
     for _ in range(600):
         assert process.poll() is None, "the server ended"

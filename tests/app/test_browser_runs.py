@@ -10,9 +10,10 @@ from tests.app.test_browser import (  # noqa: F401 - the fixture
     at_frame,
     button,
     columns,
+    make_server,
+    make_shelf,
     nudge,
     page,
-    serving,
     settled,
     start_from_truth,
 )
@@ -20,18 +21,9 @@ from tests.app.test_browser import (  # noqa: F401 - the fixture
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
 
 
-@pytest.fixture(scope="module")
-def shelf(tmp_path_factory):
-    """The folder of a server's runs that no other test adds to."""
-    return tmp_path_factory.mktemp("own-runs")
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory, shelf):
-    """The address of a server of the module's own, and its log so far."""
-    log = tmp_path_factory.mktemp("own-server") / "log"
-    with serving(log, shelf) as address:
-        yield address, log
+# No other test adds to these runs.
+shelf = pytest.fixture(scope="module", name="shelf")(make_shelf)
+server = pytest.fixture(scope="module", name="server")(make_server)
 
 
 def kept(shelf):

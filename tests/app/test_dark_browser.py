@@ -7,7 +7,7 @@ from tests.app.test_browser_help import serious
 __all__ = ["page"]
 
 CARDS = ("Open another session", "Live sensor", "All other settings", "Save as a preset", "Runs", "Export")
-TABS = ("Overview", "What the filter thinks", "3-D scene")
+TABS = ("Overview", "What the filter thinks", "3-D scene", "Pose the hand", "Mark joints")
 
 
 def looked_at(page, name):

@@ -1,15 +1,20 @@
 """A page opens what is in the folders that the server was started with, and nothing else."""
 
+import json
 import os
 import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import pytest
 
 from app.controller import Controller
-from app.folders import OutsideError, allowed, allowed_session, allowed_source
+from app.folders import SAMPLES, OutsideError, allowed, allowed_session, allowed_source
+from app.keeper import Keeper
 from app.live import Live
+from app.marking import Marking
+from app.posing import Posing
 from app.runner import Runner
 from app.server import bundled, open_shared
 from app.shelf import Shelf
@@ -18,6 +23,8 @@ from app.uploads import Uploads
 from app.views.session_card import SessionCard
 from spf.errors import RunError, SensorError, SessionError
 from spf.live.tracking import Request
+from spf.sessions import open_session
+from spf.sessions.marks import marks_file
 from spf.trackers import make_settings
 
 
@@ -110,6 +117,59 @@ def test_pose_and_hand_files_are_confined_too(room, act):
         act(controller.start)
         assert "none of the folders" in state.error
         controller.close()
+
+
+def test_what_a_page_writes_it_may_open_again(room, act, monkeypatch):
+    inside, outside = room
+    monkeypatch.setenv("SPF_RUNS", str(outside / "runs"))  # the folder of runs may always be opened
+    shutil.copy(outside / "mine.mcap", inside / "take.mcap")
+    state = State(init="truth")
+    controller = Controller(state, Runner(), open_shared, keeper=Keeper(state, Shelf()), allowed=allowed)
+    posing, marking = Posing(controller, Shelf().folder), Marking(controller)
+    act(lambda: controller.open(str(inside / "take.mcap")), posing.begin)
+    # a pose
+    posing.use()
+    act(controller.start, controller.step)
+    assert state.error == ""
+    assert Path(state.pose_file).is_relative_to(outside / "runs" / "poses")
+    # marks beside the session, and within it
+    wrist = marking.session.camera.project(marking.frame().truth.joints[0])
+    marking.place(*wrist)
+    assert state.error == ""
+    act(lambda: controller.open(str(inside / "take.mcap")))
+    assert marking.marks
+    act(marking.embed, lambda: controller.open(str(inside / "take.mcap")))
+    assert state.error == ""
+    assert marking.marks
+    # a run
+    assert open_shared(Shelf().runs()[0].manifest["session"]["uri"], None)
+    # where a live recording goes
+    assert allowed(SAMPLES / "live-2026-01-01-120000.mcap")
+    controller.close()
+
+
+def test_marks_are_neither_read_nor_written_outside(room, act, monkeypatch):
+    frames = room[1] / "frames"
+    frames.mkdir()
+    session = open_session(room[1] / "mine.mcap")
+    for index in range(2):
+        cv2.imwrite(str(frames / f"{index:04}.png"), session.raw_depth(index))
+    camera = session.camera
+    numbers = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")}
+    (frames / "camera.json").write_text(json.dumps(numbers | {"depth_unit": session.depth_unit}))
+    monkeypatch.setenv("SPF_SESSIONS", str(frames))  # the session is the folder: what is beside it lies outside
+    state = State()
+    controller = Controller(state, Runner(), open_shared, allowed=allowed)
+    marking = Marking(controller)
+    act(lambda: controller.open(str(frames)))
+    assert state.error == ""
+    marking.place(*camera.project(session[0].truth.joints[0]))
+    assert "frames.marks.json is in none of the folders" in state.error
+    assert not marks_file(frames).exists()
+    marks_file(frames).write_text("{}")
+    with pytest.raises(OutsideError, match=r"marks\.json is in none of the folders"):
+        open_shared(str(frames), None)
+    controller.close()
 
 
 @pytest.mark.parametrize("run", ["..", ".", "", "../x", "/etc"])

@@ -14,6 +14,7 @@ from app.views.live_card import LiveCard, told
 from spf.errors import SensorError, SessionError
 from spf.live import FeedState, Recording
 from spf.live.tracking import Request
+from spf.prepare import prepare
 from spf.sessions import open_session
 from spf.trackers import make_settings
 
@@ -54,6 +55,19 @@ def test_it_is_seen_tracked_and_recorded(live, tmp_path):
     assert [(note.kind, note.text) for note in session.notes] == [("marker", ""), ("note", "thumb")]
 
 
+def test_a_start_that_may_be_wrong_is_said_while_it_is_tracked(sample, monkeypatch):
+    start = prepare(open_session(sample), init="truth")
+    doubtful = start._replace(margin=0.0, shape=start.shape._replace(lens=1.3))
+    monkeypatch.setattr("app.live.find_live_start", lambda *_asked: doubtful)
+    live = Live(f"replay:{sample}?loop=1", REQUEST)
+    wait_for(lambda: live.facts.warning)
+    text = told(live.facts)
+    live.close()
+    assert "The side may be wrong" in text
+    assert "choose it under Hand shown" in text
+    assert "check the camera file" in text
+
+
 def test_a_sensor_that_is_missing_is_told_and_waited_for():
     live = Live("replay:nowhere.mcap", REQUEST)
     wait_for(lambda: "There is no file or folder nowhere.mcap" in told(live.facts))
@@ -70,11 +84,11 @@ def test_what_is_told():
     recording = Recording(
         Path("r.mcap"), 90, 1, 4, 3.0, 2_500_000, 60.0, "The disk is full in about 60 s: make room.", ""
     )
-    text = told(LiveFacts("Tracking", state, recording, 28.0, (31.4, 58.8), 7, 2, ""))
+    text = told(LiveFacts("Tracking", state, recording, 28.0, (31.4, 58.8), 7, 2, "The side may be wrong", ""))
     for part in (
         "30 frames/s", "tracked 28/s", "latency 31 ms, 95 % under 59 ms", "7 dropped for newer ones", "hand lost in 2",
         "3 lost before this computer", "connected again 2×", "90 frames, 3 s, 2.5 MB", "4 not recorded",
-        "The disk is full in about 60 s", "&lt;Trying&gt;",
+        "The disk is full in about 60 s", "&lt;Trying&gt;", "The side may be wrong",
     ):  # fmt: skip
         assert part in text
 
@@ -102,7 +116,7 @@ def test_the_card_connects_records_and_opens_what_was_recorded(sample, tmp_path)
         card._set_mark(None)
         assert card._note.value == ""
         await asyncio.sleep(0.3)
-        assert card._picture.image[:2] == b"\xff\xd8"  # a JPEG
+        assert card._picture.source.startswith("data:image/jpeg;base64,/9j/")
         await card._toggle_recording(None)
         assert card._reopen.visible
         await card._open_recorded(None)

@@ -5,7 +5,8 @@ import shutil
 import numpy as np
 import pytest
 
-from app.marking import Marking, depth_beneath, skin_offsets
+from app.marking import Marking
+from app.placing import depth_beneath, skin_offsets
 from spf.frame import JOINT_NAMES
 from spf.sessions import marks_in, open_session
 from spf.sessions.marks import marks_file

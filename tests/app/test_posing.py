@@ -10,6 +10,7 @@ from app.placed import SHAPE_PARTS, part_of, pixels_of
 from app.posing import Posing
 from app.server import bundled
 from app.views.overlay import overlay_of, picture_of
+from app.views.start_card import StartCard
 from spf.cli import execute
 from spf.hand import read_hand_shape, read_pose
 from spf.hand.kinematics import joints_of
@@ -118,12 +119,16 @@ def test_measuring_can_be_cancelled(posing):
 
 def test_a_run_starts_from_the_pose_and_the_command_line_reads_it(posing, act, sample, tmp_path):
     act(posing.fit)
+    card = StartCard(posing.state, posing._controller.start)
+    assert "That of the truth, if it has one" in card.hands
     posing.use()
     posing.use()
     state, controller = posing.state, posing._controller
     names = [f"{state.session.name}-frame-0{again}.json" for again in ("-2", "")]
     assert sorted(path.name for path in (tmp_path / "poses").iterdir()) == names
     assert state.pose_file == str(tmp_path / "poses" / names[0])
+    assert (state.init, state.shape) == ("file", "depth")
+    assert "That of the pose file, if it has one" in card.hands
     act(controller.start)
     assert state.error == ""
     start = state.origin.start

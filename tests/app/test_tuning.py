@@ -90,6 +90,28 @@ def test_what_cannot_be_seen_at_once_is_said(page, sample):
     previewer.close()
 
 
+def test_that_drawn_samples_need_the_frame_again_is_said(page, sample):
+    state, controller = page
+    previewer, card = Previewer(state), LandscapeCard(state)
+
+    async def scene():
+        await controller.open(sample)
+        state.change("rounds", 1)
+        await controller.start()
+        state.change("weighting", "laplace")
+        state.change("k", 5.0)
+        await weighed(state)
+        while state.preview.landscape is None:
+            await asyncio.sleep(0.01)
+
+    asyncio.run(asyncio.wait_for(scene(), 120))
+    assert "press This frame again" in state.preview.note
+    assert state.entry.result is state.lane.entry(0).result  # nothing is made up
+    card.draw()
+    assert card.image.data["cost"][0].shape == (19, 19)
+    previewer.close()
+
+
 def test_a_preset_is_saved_as_a_file_and_read_back(tmp_path):
     presets = Presets(tmp_path / "presets")
     lane = Lane(presets=presets)
