@@ -192,9 +192,10 @@ def read_track(path: Path) -> Track:
         RunError: the file is missing, torn or no track.
     """
     try:
-        # Through Python's own file, whose errors carry the system's words.
-        with path.open("rb") as file:
-            table = pq.read_table(file)
+        # Read by Python, whose errors carry the system's words, and decoded in this thread: a thread of Arrow's that still
+        # holds an object of Python's when the program ends aborts it.
+        with pq.ParquetFile(pa.BufferReader(path.read_bytes()), pre_buffer=False) as file:
+            table = file.read(use_threads=False)
     except pa.ArrowInvalid:
         raise RunError(f"The track {path} is torn or no Parquet file: track the session again.") from None
     except OSError as error:

@@ -1,8 +1,11 @@
 """A run kept in a directory: what is written is read back, what was tracked is kept, and a repetition is identical."""
 
 import json
+import subprocess
+import sys
 import tracemalloc
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -153,6 +156,20 @@ def test_parts_of_a_run_are_joined_to_one_track(kept):
                 np.testing.assert_array_equal(whole.timings[stage], parts.timings[stage])
         else:
             np.testing.assert_array_equal(getattr(whole, name), getattr(parts, name))
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="counts the threads of a process as Linux tells them")
+def test_reading_a_run_leaves_no_thread_behind(kept):
+    """One that still held the file when the program ended aborted it, now and then."""
+    code = (
+        "import os, sys; from pathlib import Path; from spf.trackfile import read_track; "
+        "before = len(os.listdir('/proc/self/task')); read_track(Path(sys.argv[1])); "
+        "print(len(os.listdir('/proc/self/task')) - before)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(kept / "track.parquet")], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "0\n"
 
 
 def test_a_long_run_takes_little_memory(kept, tmp_path):
