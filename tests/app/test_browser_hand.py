@@ -54,15 +54,24 @@ def middle(page, handle):  # noqa: F811
     return np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
 
 
-def drag(page, handle, right, down):  # noqa: F811
-    """Drag a handle, and return how far it went."""
+def until(page, condition):  # noqa: F811
+    """Wait until something holds: the server may be busy."""
+    for _ in range(100):
+        if condition():
+            return
+        page.wait_for_timeout(100)
+    assert condition()
+
+
+def drag(page, handle, right, down, within):  # noqa: F811
+    """Drag a handle, and wait until it is there, within so many pixels."""
     begin = middle(page, handle)
     page.mouse.move(*begin)
     page.mouse.down()
     page.mouse.move(*np.add(begin, (right, down)), steps=6)
     page.mouse.up()
     page.wait_for_timeout(800)
-    return middle(page, handle) - begin
+    until(page, lambda: np.abs(middle(page, handle) - begin - (right, down)).max() <= within)
 
 
 def overlap(page):  # noqa: F811
@@ -86,26 +95,24 @@ def test_a_hand_is_posed_fitted_and_tracked_from(page, shelf, tmp_path):  # noqa
     fitted = overlap(page)
     assert fitted > 75
     picture_of(page, "fitted")
-    assert drag(page, "palm", -40, 24) == pytest.approx([-40, 24], abs=3)
-    assert drag(page, "middle_tip", 0, 50) == pytest.approx([0, 50], abs=6)
-    assert overlap(page) < fitted - 10
+    drag(page, "palm", -40, 24, within=3)
+    drag(page, "middle_tip", 0, 50, within=6)
+    until(page, lambda: overlap(page) < fitted - 10)
     picture_of(page, "dragged")
     for _ in range(2):
         button(page, "Undo pose").click()
         page.wait_for_timeout(600)
-    assert overlap(page) == fitted
+    until(page, lambda: overlap(page) == fitted)
     button(page, "Index").click()
     slider = page.get_by_role("slider", name=re.compile("Index PIP flexion"))
     slider.focus()
     tip = middle(page, "index_tip")
     for _ in range(30):
         page.keyboard.press("ArrowRight")
-    page.wait_for_timeout(1000)
-    assert np.linalg.norm(middle(page, "index_tip") - tip) > 2
+    until(page, lambda: np.linalg.norm(middle(page, "index_tip") - tip) > 2)
     button(page, "Fit from here").click()
-    page.wait_for_function(
-        "(least) => Number(/overlap by (\\d+)/.exec(document.body.innerText)?.[1] ?? least) >= least", arg=fitted - 6
-    )
+    page.get_by_text("Fitted to this frame.").wait_for(timeout=COMPILING)
+    assert overlap(page) >= fitted - 6
     button(page, "Fit shape").click()
     page.locator(".shape-change").wait_for(timeout=COMPILING)
     picture_of(page, "shape")
@@ -163,7 +170,7 @@ def test_joints_are_marked_and_kept(page, shelf):  # noqa: F811
         assert recorded.camera.project(marks[name].point) == pytest.approx(pixels[joint], abs=1.0)
     picture_of(page, "marked")
     before = middle(page, "thumb_tip")
-    drag(page, "thumb_tip", 12, 0)
+    drag(page, "thumb_tip", 12, 0, within=4)
     page.keyboard.press("ArrowRight")  # moves the mark, not the time line
     page.keyboard.press("]")
     page.wait_for_timeout(1000)
