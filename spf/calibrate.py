@@ -23,6 +23,7 @@ from spf.hand.shape import HandShape, lengths_of_digits
 from spf.observation import Observation
 from spf.optimisers.smd import SmdSettings, optimise
 from spf.parallel import map_threads
+from spf.progress import Report, silent
 
 __all__ = ["View", "fit_shape", "size_by_render"]
 
@@ -96,7 +97,13 @@ class _Normal(NamedTuple):
 
 
 def fit_shape(
-    views: list[View], first: HandShape, rng: np.random.Generator, *, iterations: int = 8, refine: bool = True
+    views: list[View],
+    first: HandShape,
+    rng: np.random.Generator,
+    *,
+    iterations: int = 8,
+    refine: bool = True,
+    progress: Report | None = None,
 ) -> tuple[HandShape, list[View], float]:
     """Fit one hand shape to several views of a hand; of all steps, the one whose render explains them best.
 
@@ -106,21 +113,23 @@ def fit_shape(
         rng: randomness of the samples.
         iterations: Gauss-Newton steps; poses are re-optimised by SMD after each.
         refine: whether lengths and thickness are fitted too; else the scale alone.
+        progress: called with what is being done and the share done.
 
     Returns:
         (shape, views with their poses in that shape, mean golden energy).
     """
     settings, descent = CostSettings(background=_BACKGROUND), SmdSettings(rounds=4)
-    parameters = _parameters(first)
+    report, parameters = progress or silent, _parameters(first)
+    hand = _shape(first, parameters).hand()
     free = np.ones(_NAMES, bool) if refine else np.arange(_NAMES) == 0
     best = first, views, _mean_golden(views, first.hand(), settings, rng)
-    for _ in range(iterations):
-        shapes = [_shape(first, parameters)]
-        shapes += [_shape(first, parameters + _DELTA * np.eye(_NAMES)[i]) for i in np.flatnonzero(free)]
-        hands = [shape.hand() for shape in shapes]
-        seeds, spheres = rng.spawn(len(views)), digit_spheres(hands[0])
+    for done in range(iterations):
+        report("Fitting the hand's shape", done / iterations)
+        nudged = [_shape(first, parameters + _DELTA * np.eye(_NAMES)[i]) for i in np.flatnonzero(free)]
+        hands = [hand, *(shape.hand() for shape in nudged)]
+        seeds, spheres = rng.spawn(len(views)), digit_spheres(hand)
         problems = [
-            make_problem(hands[0], view.observation, settings, view.reference, seed, spheres, pool=_POOL)
+            make_problem(hand, view.observation, settings, view.reference, seed, spheres, pool=_POOL)
             for view, seed in zip(views, seeds, strict=True)
         ]
         normals = map_threads(
@@ -130,8 +139,9 @@ def fit_shape(
         step = _shape_step(normals, parameters, free)
         parameters = parameters + np.clip(step, -0.1, 0.1)
         shape = _shape(first, parameters)
-        views = _repose(views, shape.hand(), settings, descent, rng)
-        explained = _mean_golden(views, shape.hand(), settings, rng)
+        hand = shape.hand()
+        views = _repose(views, hand, settings, descent, rng)
+        explained = _mean_golden(views, hand, settings, rng)
         if explained < best[2]:
             best = shape, views, explained
     return best

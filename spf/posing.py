@@ -23,7 +23,7 @@ from spf.lens import Through, seen_through
 from spf.locate import reach_of, suggested
 from spf.observation import Observation, observe
 from spf.optimisers.smd import optimise
-from spf.progress import Report, silent
+from spf.progress import Report, part_of, silent
 from spf.segmentation import Region, find_plane, find_regions
 
 __all__ = ["Explained", "calibrated_from", "explained", "first_stance", "fitted_from", "open_hand"]
@@ -184,14 +184,13 @@ def calibrated_from(
     seen = Through(frames, shape.lens)[:_FRAMES]
     for steps, refine, share in ((_SIZE_STEPS, False, 0.0), (_SHAPE_STEPS, True, 0.4)):
         views = _views(seen, shape, stance, rng, report, share)
-        for step in range(steps):
-            report("Fitting the hand's shape", share + 0.2 + 0.2 * step / steps)
-            shape, views, _ = fit_shape(views, shape, rng, iterations=1, refine=refine)
+        within = part_of(report, share + 0.2, share + 0.4)
+        shape, views, _ = fit_shape(views, shape, rng, iterations=steps, refine=refine, progress=within)
         stance = turned_home(Stance(views[0].pose, views[0].reference))
     report("Fitting the hand's size", 0.9)
     shape, views, _ = size_by_render(views, shape, rng)
     stance = turned_home(Stance(views[0].pose, views[0].reference))
-    return shape, fitted_from(frames[0], shape, stance, rng, lambda text, share: report(text, 0.95 + 0.05 * share))
+    return shape, fitted_from(frames[0], shape, stance, rng, part_of(report, 0.95, 1.0))
 
 
 def _views(

@@ -15,7 +15,7 @@ from markupsafe import Markup
 from spf import __version__
 from spf.errors import RenderUnavailableError, RunError
 from spf.export.writing import written_whole
-from spf.progress import Report, silent
+from spf.progress import Report, part_of, silent
 from spf.render import Renderer
 from spf.report import content
 from spf.report.keyframes import MOST_LOSSES, Shot, key_frames, shots
@@ -74,7 +74,7 @@ def report_html(
     if not len(run.track):
         raise RunError("The run has tracked no frame, so that there is nothing to report: track the session again.")
     report = progress or silent
-    figures = content.figures_of(run, session, lambda text, share: report(text, _COMPARING * share))
+    figures = content.figures_of(run, session, part_of(report, 0.0, _COMPARING))
     drawn, cannot_draw = _shots(run, session, figures, renderer, report)
     groups = content.setting_rows(run)
     return _template().render(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.errors import SessionError
-from spf.progress import Report
+from spf.progress import Report, part_of
 from spf.sessions import bag_ros1, bag_sqlite
 from spf.sessions.bag import Bag, Topic
 from spf.sessions.bag_mcap import McapBag
@@ -174,19 +174,14 @@ def _open_folder(path: Path, report: Report) -> Bag:
         raise SessionError(f"There is no .db3 and no .mcap file beside {path / _YAML}: copy the whole folder.")
     parts: list[Bag] = []
     for number, file in enumerate(files):
-        part_of = _part_of(report, number, len(files))
+        within = part_of(report, number / len(files), (number + 1) / len(files))
         if has_magic(file):
-            parts.append(McapBag(file, packed, part_of))
+            parts.append(McapBag(file, packed, within))
         elif is_sqlite_bag(file):
-            parts.append(SqliteBag(file, packed, part_of))
+            parts.append(SqliteBag(file, packed, within))
         else:
             raise SessionError(f"{file} is no part of a ROS 2 bag: take it out of the folder.")
     return parts[0] if len(parts) == 1 else ChainedBag(path, parts)
-
-
-def _part_of(report: Report, number: int, count: int) -> Report:
-    """Return what is told how far one of several equal parts of some work is."""
-    return lambda text, share: report(text, (number + share) / count)
 
 
 def _head(path: Path, size: int = _HEAD) -> bytes:
