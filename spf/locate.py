@@ -211,33 +211,38 @@ def unfamiliarity(network: Network | None, frame: Frame, hand: Hand, pose: Array
     """
     if network is None:
         return 0.0
-    middle = joints_of(hand, pose).mean(axis=0)
-    size = hand.length / load_hand(hand.side).length
-    seen = guesses(network, frame.depth, frame.camera, middle, extent_of(size))
+    seen = seen_at(network, frame, hand, pose, np.eye(3), ("right", "left"))
     sureness = [
-        -3.0 * float(np.log(0.5 * guess.joint_sigma / (guess.scale * load_hand(guess.side).length)).mean())
-        for guess in seen
+        -3.0 * float(np.log(_spread(guess) / (guess.scale * load_hand(guess.side).length)).mean()) for guess in seen
     ]
     return _STRANGE * max(_SURE - max(sureness), 0.0)
 
 
-def seen_at(network: Network, frame: Frame, hand: Hand, pose: Array, reference: Array) -> list[Guess]:
-    """What the network makes of a frame around a pose (D,) relative to ``reference``: hands of that side, the best first."""
+def seen_at(
+    network: Network, frame: Frame, hand: Hand, pose: Array, reference: Array, sides: Sequence[Side] = ()
+) -> list[Guess]:
+    """What the network makes of a frame around a pose (D,) relative to ``reference``: hands of its side or of ``sides``, the
+    best first."""
     middle = joints_of(hand, pose, reference).mean(axis=0)
     size = hand.length / load_hand(hand.side).length
-    return guesses(network, frame.depth, frame.camera, middle, extent_of(size), (hand.side,))
+    return guesses(network, frame.depth, frame.camera, middle, extent_of(size), sides or (hand.side,))
 
 
 def strangeness_to(seen: Sequence[Guess], hand: Hand, joints: Array) -> float:
     """The same of joints (21, 3), m, for who has asked the network already; 0 where it was not asked."""
 
     def log_density(guess: Guess) -> float:
-        spread = 0.5 * guess.joint_sigma  # of the Laplace density exp(-r/b)/(8 π b³)
+        spread = _spread(guess)
         apart = np.linalg.norm(guess.joints - joints, axis=1)
         per_joint = -apart / spread - 3.0 * np.log(spread / hand.length)
         return float(per_joint.mean()) + guess.log_weight / len(joints)
 
     return _STRANGE * max(_FAMILIAR - max((log_density(guess) for guess in seen), default=_FAMILIAR), 0.0)
+
+
+def _spread(guess: Guess) -> Array:
+    """(21,) m, b of the Laplace density exp(-r/b)/(8 π b³) of each joint."""
+    return 0.5 * guess.joint_sigma
 
 
 def _seeds(found: list[Guess], size: float | None) -> Seeds:

@@ -11,6 +11,7 @@ import panel_material_ui as pmu
 
 from app.marking import Marking
 from app.views.download import Download
+from app.views.words import facts
 from spf.errors import SpfError
 from spf.frame import JOINT_NAMES
 from spf.sessions.marks import count_marks
@@ -138,8 +139,8 @@ class MarkControls:
             "embed": marking.is_native and bool(marking.marks) and not marking.state.busy,
         }.items():  # fmt: skip
             self._buttons[name].disabled = not can or marking.state.session is None
-        self._chosen.object = _told(self._about_chosen(states[marking.chosen]), marking.told)
-        self._kept.object = _told(self._about_all(), "")
+        self._chosen.object = facts(self._about_chosen(states[marking.chosen]), marking.told, name="marks-told")
+        self._kept.object = facts(self._about_all(), name="marks-told")
 
     def _about_chosen(self, known: str) -> str:
         marking = self._marking
@@ -162,9 +163,3 @@ class MarkControls:
         if not frames:
             return "No joint of this session is marked. What is marked is kept beside it at once, and is its truth."
         return f"In this session: {joints} joint{'s' * (joints != 1)} in {frames} frame{'s' * (frames != 1)}, kept."
-
-
-def _told(words: str, more: str) -> str:
-    ink = "color:var(--panel-on-background-color,#2a3038)"
-    added = f"<br><span style='opacity:0.8'>{more}</span>" if more else ""
-    return f"<div class='marks-told' style='font:12.5px/1.45 Roboto,sans-serif;{ink}'>{words}{added}</div>"

@@ -15,8 +15,8 @@ from app.views.grid import card
 from app.views.mark_controls import MarkControls
 from app.views.overlay import focus_of, lines_of, picture_of
 from app.views.plots import heading
-from app.views.pose_tab import noted
 from app.views.sheet import Sheet
+from app.views.words import noted
 from spf.errors import SessionError
 from spf.frame import JOINT_NAMES
 from spf.sessions.marks import joints_of_marks

@@ -12,6 +12,7 @@ import panel_material_ui as pmu
 from app.posing import Posing
 from app.views.download import Download
 from app.views.entries import axis_label, in_units
+from app.views.words import facts
 from spf.errors import SpfError
 from spf.hand.handles import entries_of
 from spf.hand.model import FINGERS
@@ -136,6 +137,4 @@ class PoseControls:
                 f"Frame {posing.state.frame}: silhouettes overlap by <b>{100 * overlap:.0f} %</b>, golden energy "
                 f"<b>{golden:.2f}</b> (0 explains all)."
             )
-        told = f"<br><span style='opacity:0.8'>{posing.told}</span>" if posing.told else ""
-        ink = "color:var(--panel-on-background-color,#2a3038)"
-        return f"<div class='pose-told' style='font:12.5px/1.45 Roboto,sans-serif;{ink}'>{words}{told}</div>"
+        return facts(words, posing.told, name="pose-told")

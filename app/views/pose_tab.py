@@ -17,10 +17,11 @@ from app.views.plots import heading
 from app.views.pose_controls import PoseControls
 from app.views.shape_controls import ShapeControls
 from app.views.sheet import Sheet
+from app.views.words import noted
 from spf.errors import SessionError
 from spf.hand.handles import HANDLES
 
-__all__ = ["PoseTab", "noted"]
+__all__ = ["PoseTab"]
 
 _HEIGHT = 620
 _STEP = 0.005  # m that a turn of the wheel with Shift moves the hand
@@ -117,9 +118,3 @@ class PoseTab(Follower):
             posing.push(_STEP * wish["steps"])
         elif kind == "undo":
             posing.undo()
-
-
-def noted(words: str) -> str:
-    """Return a line under a picture as HTML."""
-    ink = "color:var(--panel-on-background-color,#2a3038);opacity:0.8"
-    return f"<div style='font:12px/1.4 Roboto,sans-serif;{ink}'>{words}</div>"

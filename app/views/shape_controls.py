@@ -11,6 +11,7 @@ import panel_material_ui as pmu
 from app.placed import SHAPE_PARTS, Placed, part_of
 from app.posing import Posing
 from app.views.download import Download
+from app.views.words import facts
 from spf.errors import SpfError
 
 __all__ = ["ShapeControls"]
@@ -119,6 +120,5 @@ def _told(placed: Placed, before: Placed | None) -> str:
             "<table class='shape-change' style='width:100%;font-variant-numeric:tabular-nums;text-align:right'>"
             f"<tr><th></th><th>before</th><th>fitted</th></tr>{cells}</table>"
         )
-    ink = "color:var(--panel-on-background-color,#2a3038)"
     style = "<style>.shape-change td:first-child{text-align:left}.shape-change th{font-weight:500}</style>"
-    return f"{style}<div style='font:12.5px/1.45 Roboto,sans-serif;{ink}'>{words}</div>"
+    return style + facts(words)

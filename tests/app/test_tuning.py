@@ -33,14 +33,20 @@ async def weighed(state):
         await asyncio.sleep(0.01)
 
 
+async def begun(page, sample, rounds):
+    """Open a session and start a run that costs little."""
+    state, controller = page
+    await controller.open(sample)
+    state.change("rounds", rounds)
+    await controller.start()
+
+
 def test_a_moved_slider_is_seen_in_the_frame_shown_and_tracks_nothing(page, sample):
     state, controller = page
     previewer, card = Previewer(state), LandscapeCard(state)
 
     async def scene():
-        await controller.open(sample)
-        state.change("rounds", 2)
-        await controller.start()
+        await begun(page, sample, 2)
         await controller.step()
         await weighed(state)
         before = state.lane.entry(1)
@@ -75,13 +81,11 @@ def test_the_frame_is_seen_again_through_the_lens_that_it_was_tracked_through(pa
 
 
 def test_what_cannot_be_seen_at_once_is_said(page, sample):
-    state, controller = page
+    state, _ = page
     previewer = Previewer(state)
 
     async def scene():
-        await controller.open(sample)
-        state.change("rounds", 1)
-        await controller.start()
+        await begun(page, sample, 1)
         state.change("n", 9)
         await weighed(state)
 
@@ -91,13 +95,11 @@ def test_what_cannot_be_seen_at_once_is_said(page, sample):
 
 
 def test_that_drawn_samples_need_the_frame_again_is_said(page, sample):
-    state, controller = page
+    state, _ = page
     previewer, card = Previewer(state), LandscapeCard(state)
 
     async def scene():
-        await controller.open(sample)
-        state.change("rounds", 1)
-        await controller.start()
+        await begun(page, sample, 1)
         state.change("weighting", "laplace")
         state.change("k", 5.0)
         await weighed(state)
