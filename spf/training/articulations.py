@@ -27,8 +27,8 @@ _THUMBS = np.radians(  # beside the palm, stretched out, spread, across the palm
     ]
 )
 _FAN = np.array([1.0, 0.3, -0.5, -1.2])  # of index to little: how spreading turns them
-_SHARES = (0.34, 0.3, 0.12, 0.24)
-_PINCHES_A_FINGER = 12
+_SHARES = (0.31, 0.27, 0.2, 0.22)
+_PINCHES_A_FINGER = 40
 
 
 def draw_articulations(rng: np.random.Generator, n: int) -> Array:
@@ -89,7 +89,7 @@ def _pinch_bank() -> Array:
 
 def _pinches(rng: np.random.Generator, n: int) -> Array:
     bank = _pinch_bank()
-    return np.asarray(bank[rng.integers(len(bank), size=n)] + np.radians(rng.normal(0.0, 3.0, (n, 20))))
+    return np.asarray(bank[rng.integers(len(bank), size=n)] + np.radians(rng.normal(0.0, 4.0, (n, 20))))
 
 
 def _independent(rng: np.random.Generator, n: int) -> Array:

@@ -1,6 +1,7 @@
 """Train the network: ``python -m spf.training.train -o RUN --samples 3000000``.
 
-Seeded, and resumed from the run's last checkpoint when it is started again. Samples are made in a second thread while
+Seeded, and resumed from the run's last checkpoint when it is started again; ``--begin FILE.onnx`` begins with the weights of
+another run's network. Samples are made in a second thread while
 the first learns; both together take little more than one core. Every few minutes the averaged weights are exported
 to ``RUN/hand-proposal.onnx`` with a JSON beside it.
 """
@@ -8,6 +9,7 @@ to ``RUN/hand-proposal.onnx`` with a JSON beside it.
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import math
 import time
@@ -21,6 +23,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from spf.training.begin import begin_from
 from spf.training.export import export_network
 from spf.training.generator import Batch, Generator
 from spf.training.network import HandNetwork, Losses, loss_of
@@ -40,6 +43,7 @@ class Plan:
         rate: highest learning rate (AdamW; a cosine from a short warm-up to 1 % of it).
         decay: weight decay.
         average: decay of the average of the weights a step.
+        begun_from: SHA-256 of the network whose weights it began with; none: with random ones.
     """
 
     samples: int = 3_000_000
@@ -49,6 +53,7 @@ class Plan:
     rate: float = 3e-3
     decay: float = 1e-4
     average: float = 0.999
+    begun_from: str | None = None
 
     @property
     def steps(self) -> int:
@@ -121,6 +126,17 @@ class Trainer:
         return trainer
 
 
+def begun(plan: Plan, network: Path | None) -> Trainer:
+    """Return a trainer at its first step, with random weights or those of an exported network."""
+    if network is None:
+        return Trainer(plan)
+    trainer = Trainer(replace(plan, begun_from=hashlib.sha256(network.read_bytes()).hexdigest()))
+    crops = tensors(Generator(plan.seed, plan.shapes).batch(plan.steps, 512))[0]
+    begin_from(trainer.network, network, crops)
+    trainer.averaged.load_state_dict(trainer.network.state_dict())
+    return trainer
+
+
 def tensors(batch: Batch) -> tuple[Tensor, ...]:
     """Return a batch as tensors, the crops (N, 1, S, S)."""
     return torch.from_numpy(batch.crops)[:, None], *(torch.from_numpy(array) for array in batch[1:])
@@ -172,13 +188,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=Plan.seed)
     parser.add_argument("--batch", type=int, default=Plan.batch)
     parser.add_argument("--shapes", type=int, default=Plan.shapes)
+    parser.add_argument("--rate", type=float, default=Plan.rate, help="highest learning rate")
+    parser.add_argument("--begin", type=Path, metavar="FILE.onnx", help="begin with the weights of this network")
     parser.add_argument("--export-minutes", type=float, default=5.0)
     options = parser.parse_args()
     torch.set_num_threads(1)
     options.output.mkdir(parents=True, exist_ok=True)
     checkpoint = options.output / "checkpoint.pt"
-    plan = Plan(batch=options.batch, seed=options.seed, shapes=options.shapes)
-    trainer = Trainer.load(checkpoint) if checkpoint.exists() else Trainer(plan)
+    plan = Plan(batch=options.batch, seed=options.seed, shapes=options.shapes, rate=options.rate)
+    trainer = Trainer.load(checkpoint) if checkpoint.exists() else begun(plan, options.begin)
     if options.samples is not None:
         trainer.plan = replace(trainer.plan, samples=options.samples)
     train(trainer, options.output, options.export_minutes)
