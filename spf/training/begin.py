@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
@@ -36,25 +38,22 @@ def begin_from(network: HandNetwork, path: Path, crops: Tensor) -> None:
     graph = onnx.load(str(path)).graph
     arrays = {item.name: torch.from_numpy(np.array(numpy_helper.to_array(item))) for item in graph.initializer}
     modules = dict(network.named_modules())
-    folded = {  # node "/a/a.1/a.1.0/Conv" is module a.1.0, "/a/a.2/convolution/Conv" is a.2.convolution
-        name: node.input[1:]
-        for node in graph.node
-        if node.op_type == "Conv"
-        for name in [_module_of(node.name)]
-        if name in modules and node.input[1] not in (f"{name}.weight",)
-    }
-    norms = {name: modules[_norm_after(name)] for name in folded}
-    left = set(arrays) - {name for inputs in folded.values() for name in inputs}
+    kernels = {_module_of(node.name): node.input[1:3] for node in graph.node if node.op_type == "Conv"}
+    norms = {name: norm for name in kernels if isinstance(norm := modules.get(_norm_after(name)), nn.BatchNorm2d)}
+    of_norms = {f"{_norm_after(name)}.{part}" for name in norms for part in ("weight", "bias")}
     ours = dict(network.named_parameters())
-    for name in sorted(set(ours) - _WITHOUT_EFFECT - _of(folded)):
-        if name not in left or arrays[name].shape != ours[name].shape:
+    for name in ours.keys() - of_norms - _WITHOUT_EFFECT:
+        convolution = name.removesuffix(".weight")
+        source = kernels[convolution][0] if convolution in norms else name
+        if source not in arrays or arrays[source].shape != ours[name].shape:
             raise SpfError(f"{path} is of another network: it has no {name} of shape {tuple(ours[name].shape)}.")
-        ours[name].copy_(arrays[name])
+        ours[name].copy_(arrays[source])
     hooks = []
-    for name, (kernel, shift) in folded.items():
-        lengths = arrays[kernel].flatten(1).norm(dim=1)
-        ours[f"{name}.weight"].copy_(arrays[kernel] / lengths[:, None, None, None])
-        hooks.append(norms[name].register_forward_pre_hook(_undoing(lengths, arrays[shift])))
+    for name, norm in norms.items():
+        kernel, shift = (arrays[part] for part in kernels[name])
+        lengths = kernel.flatten(1).norm(dim=1)
+        ours[f"{name}.weight"].copy_(kernel / lengths[:, None, None, None])
+        hooks.append(norm.register_forward_pre_hook(_undoing(lengths, shift)))
     was_training = network.training
     network.eval()
     network(crops)
@@ -64,32 +63,26 @@ def begin_from(network: HandNetwork, path: Path, crops: Tensor) -> None:
 
 
 def _module_of(node: str) -> str:
-    """Return the name of the module that a node of the graph belongs to."""
-    *scopes, _ = node.strip("/").split("/")
+    """Name of the module that a node is of: "/a/a.1/a.1.0/Conv" is of a.1.0, "/a/a.2/convolution/Conv" of a.2.convolution."""
     name = ""
-    for scope in scopes:
+    for scope in node.strip("/").split("/")[:-1]:
         name = scope if scope.startswith(f"{name}.") else f"{name}.{scope}".strip(".")
     return name
 
 
 def _norm_after(convolution: str) -> str:
-    before, last = convolution.rsplit(".", 1)
-    return f"{before}.norm" if last == "convolution" else f"{before}.{int(last) + 1}"
+    """Name of the norm after a convolution, if there is one."""
+    before, _, last = convolution.rpartition(".")
+    return f"{before}.{int(last) + 1}" if last.isdecimal() else f"{before}.norm" if last == "convolution" else ""
 
 
-def _of(folded: dict[str, object]) -> set[str]:
-    """Names of the parameters of folded convolutions and their norms."""
-    return {
-        name
-        for convolution in folded
-        for name in (f"{convolution}.weight", f"{_norm_after(convolution)}.weight", f"{_norm_after(convolution)}.bias")
-    }
-
-
-def _undoing(lengths: Tensor, shift: Tensor) -> object:
+def _undoing(lengths: Tensor, shift: Tensor) -> Callable[[nn.Module, tuple[Any, ...]], None]:
     """Return what sets a norm, when it is about to see x, so that it gives ``lengths · x + shift``."""
 
-    def set_norm(norm: nn.BatchNorm2d, inputs: tuple[Tensor]) -> None:
+    def set_norm(norm: nn.Module, inputs: tuple[Any, ...]) -> None:
+        assert isinstance(norm, nn.BatchNorm2d)
+        assert norm.running_mean is not None
+        assert norm.running_var is not None
         variance, mean = torch.var_mean(inputs[0], dim=(0, 2, 3), correction=0)
         norm.running_mean.copy_(mean)
         norm.running_var.copy_(variance)

@@ -97,7 +97,8 @@ class Trainer:
     @torch.no_grad()
     def _average(self) -> None:
         keep = min(self.plan.average, (self.step + 1) / (self.step + 10))
-        ours, theirs = list(self.averaged.parameters()), list(self.network.parameters())
+        ours: list[Tensor] = list(self.averaged.parameters())
+        theirs: list[Tensor] = list(self.network.parameters())
         torch._foreach_lerp_(ours, theirs, 1.0 - keep)
         for mine, its in zip(self.averaged.buffers(), self.network.buffers(), strict=True):
             mine.copy_(its)

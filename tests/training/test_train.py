@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="torch is not installed (dependency group 'train')")
 
+from spf.errors import SpfError  # noqa: E402
 from spf.hand.model import load_hand  # noqa: E402
 from spf.learned import layout  # noqa: E402
 from spf.learned.guesses import Cubes, decode  # noqa: E402
 from spf.learned.network import load_network  # noqa: E402
 from spf.training.export import export_network  # noqa: E402
 from spf.training.generator import Generator  # noqa: E402
-from spf.training.network import loss_of, rotation_of  # noqa: E402
-from spf.training.train import Plan, Trainer, batches, tensors  # noqa: E402
+from spf.training.network import HandNetwork, loss_of, rotation_of  # noqa: E402
+from spf.training.train import Plan, Trainer, batches, begun, tensors  # noqa: E402
 
 PLAN = Plan(samples=6400, batch=32, shapes=4)
 
@@ -103,3 +107,25 @@ def test_the_exported_network_says_the_same(generator, tmp_path):
         expected = trainer.averaged(torch.from_numpy(crops)[:, None]).numpy()
     np.testing.assert_allclose(network.outputs(crops), expected, atol=1e-4)
     assert network.about["seed"] == 0
+
+
+def test_a_training_that_begins_with_an_exported_network_answers_as_that(generator, tmp_path):
+    first = Trainer(PLAN)
+    for number in range(3):  # so that its norms have something to fold
+        first.learn(tensors(generator.batch(number, 32)))
+    path = export_network(first.network, tmp_path, {})
+    second = begun(replace(PLAN, seed=9), path)
+    assert second.plan.begun_from == hashlib.sha256(path.read_bytes()).hexdigest()
+    crops = tensors(generator.batch(5, 16))[0]
+    for one in (first.network, second.network, second.averaged):
+        one.eval()
+    with torch.no_grad():
+        expected = first.network(crops)
+        torch.testing.assert_close(second.network(crops), expected, atol=1e-3, rtol=1e-3)
+        torch.testing.assert_close(second.averaged(crops), expected, atol=1e-3, rtol=1e-3)
+
+
+def test_a_training_cannot_begin_with_another_network(tmp_path):
+    path = export_network(HandNetwork(whole=100), tmp_path, {})
+    with pytest.raises(SpfError, match="another network"):
+        begun(PLAN, path)
