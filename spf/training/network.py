@@ -50,6 +50,8 @@ class HandNetwork(nn.Module):
     their mean features and in a description of the whole crop.
     """
 
+    places: Tensor
+
     def __init__(self, widths: tuple[int, int, int] = (32, 64, 128), whole: int = 192, own: int = 12) -> None:
         super().__init__()
         a, b, c = widths
