@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
+from app.clock import Clock
 from app.lane import Lane, Origin
 from app.navigation import Navigation
 from spf.errors import HandError, StartError
 from spf.hand import read_hand_shape
 from spf.prepare import prepare
 from spf.progress import Report
+from spf.sessions import Session
 
 __all__ = ["Controller"]
+
+
+_SHARES = 100  # parts of a session's opening that the time left is told from
+
+
+def _name(uri: str) -> str:
+    """Return what a session is called while it is opened: its file or folder."""
+    return uri.strip().rstrip("/").rpartition("/")[2] or "the session"
 
 
 class Controller(Navigation):
@@ -21,12 +30,25 @@ class Controller(Navigation):
     async def open(self, uri: str, camera: str = "") -> None:
         """Open a session; the one before stays when it cannot be."""
         self.cancel()
-        async with self.doing("Opening the session"):
+        async with self.doing(f"Opening {_name(uri)}"):
             if not uri.strip():
                 raise StartError("Type the path of a session first: a file or a folder.")
-            session = await self.run(partial(self.opener, uri.strip(), camera.strip() or None))
+            session = await self.run(self._opening(uri.strip(), camera.strip() or None))
             if await self.keeper.keep():
                 self.state.load(session, camera.strip())
+
+    def _opening(self, uri: str, camera: str | None) -> Callable[[Report], Session]:
+        """Return the work of opening, which says what is opened and how long that still takes."""
+        clock = Clock(_SHARES)
+
+        def work(report: Report) -> Session:
+            def told(text: str, share: float) -> None:
+                left = clock.left(int(share * _SHARES))
+                report(" · ".join(part for part in (f"{_name(uri)}: {text}", left) if part), share)
+
+            return self.opener(uri, camera, told)
+
+        return work
 
     async def start(self) -> None:
         """Find the first pose as chosen and track the first frame."""

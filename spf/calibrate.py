@@ -37,6 +37,7 @@ _BACKGROUND = 0.2
 _DESCENTS = 2
 _DELTA = 1e-3
 _SIZES = (0.9, 0.95, 1.0, 1.05, 1.1)
+_ROUNDS = 2
 _AS_GOOD = 0.03  # share by which a golden energy may be higher and weigh 1/e
 
 
@@ -64,6 +65,16 @@ def size_by_render(
     Returns:
         (shape, views with their poses in that shape, mean golden energy).
     """
+    energy = 1.0
+    for _ in range(_ROUNDS):
+        shape, views, energy = _averaged_size(views, shape, rng)
+    return shape, views, energy
+
+
+def _averaged_size(
+    views: list[View], shape: HandShape, rng: np.random.Generator
+) -> tuple[HandShape, list[View], float]:
+    """One round of :func:`size_by_render`, which does not see beyond the sizes around the one that it is given."""
     settings, descent = CostSettings(), SmdSettings()
     energies, seed = [], int(rng.integers(2**32))
     for factor in _SIZES:

@@ -297,8 +297,7 @@ def _calibrated(frames: Sequence[Frame], start: _Followed, rng: np.random.Genera
         views = [View(o, s.estimate, s.reference) for o, s, _ in tracked[::every]]
         shape, views, energy = fit_shape(views, shape, rng, iterations=iterations, refine=refine_all)
         pose = relative_to_camera(views[0].pose, views[0].reference)
-    for _ in range(2):
-        shape, views, energy = size_by_render(views, shape, rng)
+    shape, views, energy = size_by_render(views, shape, rng)
     pose = relative_to_camera(views[0].pose, views[0].reference)
     return start._replace(shape=shape, pose=pose, energy=min(energy, start.energy), explained=energy)
 

@@ -15,6 +15,7 @@ from spf.cli.live_status import (
     STATUS_EVERY,
     checked_side,
     facts,
+    raise_if_ended,
     status_line,
     stopped_by_signals,
     summarise_recording,
@@ -50,6 +51,8 @@ def record(
 
     Press Enter to set a marker; write something before it to make a note.
 
+    Fails when the disk gets full; what was recorded until then is kept.
+
     Examples:
 
         spf record replay:sessions/open-close.mcap -o recording.mcap --seconds 3
@@ -75,6 +78,7 @@ def record(
     summarise_recording(recording, state, as_json)
     if not as_json:
         print(f"Next: spf track {recording.path} -o RUN")
+    raise_if_ended(recording)
 
 
 def stream(
@@ -114,12 +118,11 @@ def _watch(feed: Feed, until: float, show: Any) -> None:
     while time.monotonic() < until:
         state, recording = feed.state, feed.recording
         show(facts(state, recording))
-        ended = "" if recording is None else recording.ended
-        sentence = ended or ("" if recording is None else recording.warning) or state.message
+        sentence = ("" if recording is None else recording.warning) or state.message
         if sentence != told:
             told = sentence
             warn(sentence)
-        if state.ended or ended:
+        if state.ended or (recording is not None and recording.ended):
             return
         feed.newest(state.taken - 1, min(STATUS_EVERY, max(until - time.monotonic(), 0.0)))
         time.sleep(min(STATUS_EVERY, max(until - time.monotonic(), 0.0)))

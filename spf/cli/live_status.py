@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.status import Status
 
 from spf.cli.console import complain
-from spf.errors import SettingError
+from spf.errors import RunError, SettingError
 from spf.live import Feed, FeedState, Recording
 from spf.sessions import Side
 
@@ -22,6 +22,7 @@ __all__ = [
     "STATUS_EVERY",
     "checked_side",
     "facts",
+    "raise_if_ended",
     "status_line",
     "stopped_by_signals",
     "summarise_recording",
@@ -64,6 +65,18 @@ def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -
         f"Recorded {recording.frames} frames ({recording.seconds:.1f} s, {recording.size / 1e6:.1f} MB) to "
         f"{recording.path}.{lost}{missing}"
     )
+
+
+def raise_if_ended(recording: Recording) -> None:
+    """Let the command fail when the recording ended by itself; what it has is said by then.
+
+    Raises:
+        RunError: it did.
+    """
+    if recording.ended:
+        raise RunError(
+            f"{recording.ended} {recording.path} has {recording.frames} frames; make room and go on in another file."
+        )
 
 
 @contextmanager

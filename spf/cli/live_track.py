@@ -11,7 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from spf.cli.console import warn, warn_of
-from spf.cli.live_status import STATUS_EVERY, facts, status_line, stopped_by_signals, summarise_recording, take_notes
+from spf.cli.live_status import (
+    STATUS_EVERY,
+    facts,
+    raise_if_ended,
+    status_line,
+    stopped_by_signals,
+    summarise_recording,
+    take_notes,
+)
 from spf.errors import RunError
 from spf.evaluate import count_losses
 from spf.live import Feed, open_live
@@ -38,9 +46,11 @@ def track_live(
     """Track a live sensor while it is recorded, and keep both.
 
     Raises:
-        RunError: no hand was believed until it ended, or its time was over before one could be tracked.
+        RunError: no hand was believed until it ended, its time was over before one could be tracked, or the disk is full.
+        SensorError: the sensor is not there; no directory is left behind.
     """
     check_free(directory, force)
+    fresh = not output.parent.exists()
     make_directory(output.parent)
     feed = Feed(open_live(uri), wait=wait)
     feed.record(output, side=request.side, overwrite=force)
@@ -52,7 +62,12 @@ def track_live(
         return time.monotonic() > until or (recording is not None and recording.ended != "")
 
     with feed, stopped_by_signals(), status_line(as_json) as show, ExitStack() as stack:
-        feed.recording_began()
+        try:
+            feed.recording_began()
+        except BaseException:  # Ctrl-C while a sensor is waited for, too
+            if fresh:
+                output.parent.rmdir()
+            raise
         take_notes(feed)
         with suppress(KeyboardInterrupt):
             start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
@@ -66,13 +81,13 @@ def track_live(
         if kept is not None:
             kept.finish()
     assert recording is not None
-    warn(recording.ended)
     summarise_recording(recording, state, as_json)
-    if kept is None:
+    if kept is None and not recording.ended:
         over = time.monotonic() > until
         raise RunError(_why_nothing(seconds if over else None, start is not None, output))
-    if not as_json:
+    if kept is not None and not as_json:
         print(_summary(kept, directory))
+    raise_if_ended(recording)
 
 
 def _why_nothing(seconds: float | None, found: bool, output: Path) -> str:

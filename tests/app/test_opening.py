@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import threading
 import time
+from pathlib import Path
 
 from app.server import open_shared
 
@@ -14,6 +16,7 @@ def test_how_far_the_opening_of_a_recording_is_is_shown(page, sample, act):
     shown = []
 
     def opener(uri, camera, report):
+        time.sleep(0.2)
         report("Reading the time stamps", 0.25)
         time.sleep(0.3)  # the page looks ten times a second
         return open_shared(uri, camera, report)
@@ -21,7 +24,10 @@ def test_how_far_the_opening_of_a_recording_is_is_shown(page, sample, act):
     controller.opener = opener
     state.param.watch(lambda event: shown.append((state.task, state.share)), "share")
     act(lambda: controller.open(sample))
-    assert ("Reading the time stamps", 0.25) in shown
+    assert len(shown) > 1
+    (text, share), *_ = shown
+    assert share == 0.25
+    assert re.fullmatch(rf"{Path(sample).name}: Reading the time stamps · about \d+ s left", text)
     assert (len(state.session), state.task, state.error) == (120, "", "")
 
 
@@ -40,7 +46,7 @@ def test_opening_a_recording_is_cancelled(page, sample):
     async def cancelled():
         controller.opener = opener
         opening = asyncio.create_task(controller.open("long.bag"))
-        while state.task != "Reading the time stamps":
+        while not state.task.startswith("long.bag: Reading the time stamps"):
             await asyncio.sleep(0.01)
         controller.cancel()
         await opening

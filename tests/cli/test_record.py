@@ -7,6 +7,7 @@ import os
 import pty
 import random
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,6 +18,9 @@ import pytest
 
 from benchmarks.kills import kill_once
 from spf.cli import execute, live_track
+from spf.errors import SensorError
+from spf.live import recorder
+from spf.live.source import LiveSource
 from spf.sessions import open_session
 from tests.sessions.makers import make_mcap
 
@@ -49,6 +53,53 @@ def test_it_stops_after_its_time(made, tmp_path, capsys):
     out = tmp_path / "r.mcap"
     assert execute(["record", f"replay:{made.path}?loop=1", "-o", str(out), "--seconds", "0.7"]) == 0
     assert 0.4 < open_session(out).times[-1] < 5
+
+
+@pytest.fixture
+def filling_disk(monkeypatch):
+    """A disk that is full a moment after a recording began."""
+    free = iter([10 << 30, *range(200 << 20, 0, -1 << 20)])
+    monkeypatch.setattr(recorder, "_LOOK_EVERY", 0.0)
+    monkeypatch.setattr(
+        recorder.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10 << 30, 0, next(free, 0))
+    )
+
+
+@pytest.mark.parametrize("command", ["record", "track"])
+def test_a_disk_that_gets_full_fails_the_command_and_keeps_what_was_recorded(
+    made, tmp_path, capsys, monkeypatch, filling_disk, command
+):
+    def find(feed, request, progress, stop):
+        while not stop():
+            time.sleep(0.01)
+
+    monkeypatch.setattr(live_track, "find_live_start", find)
+    out = tmp_path / "r.mcap" if command == "record" else tmp_path / "run"
+    file = out if command == "record" else out / "session.mcap"
+    assert execute([command, f"replay:{made.path}?loop=1", "-o", str(out), "--seconds", "60"]) == 2
+    said = capsys.readouterr().err
+    kept = len(open_session(file))
+    assert kept > 0
+    assert (
+        f"The disk is nearly full: the recording was ended, what is recorded is safe. {file} has {kept} frames" in said
+    )
+
+
+def test_a_sensor_that_is_not_there_leaves_no_run_behind(tmp_path, capsys, monkeypatch):
+    class Unplugged(LiveSource):
+        def open(self):
+            raise SensorError("There is no such sensor: plug it in.")
+
+        def captures(self):
+            raise AssertionError
+
+        def close(self):
+            pass
+
+    monkeypatch.setattr(live_track, "open_live", lambda _uri: Unplugged())
+    assert execute(["track", "realsense:", "-o", str(tmp_path / "run")]) == 2
+    assert "There is no such sensor" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
