@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import panel as pn
@@ -56,7 +58,15 @@ def _theme(primary: str) -> dict[str, Any]:
             "MuiToolbar": {"styleOverrides": {"root": {"minHeight": "48px !important"}}},
             # The buttons of numbers are as dark as in a light page otherwise.
             "MuiInputAdornment": {"styleOverrides": {"root": {"& .MuiIconButton-root": {"color": "inherit"}}}},
-            "MuiAppBar": {"styleOverrides": {"root": {"backgroundColor": f"{_BLUE} !important", "color": "white"}}},
+            "MuiAppBar": {
+                "styleOverrides": {
+                    "root": {
+                        "backgroundColor": f"{_BLUE} !important",
+                        "color": "white",
+                        "& .MuiTypography-root": {"whiteSpace": "nowrap"},
+                    }
+                }
+            },
         },
     }
 
@@ -125,12 +135,31 @@ def page() -> pmu.Page:
 
     pn.state.onload(first)
     pn.state.on_session_destroyed(gone)
-    built = pmu.Page(
-        title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, reruns.cancel).panel],
-        main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
-        theme_config=_THEME, busy_indicator=None,
-    )  # fmt: skip
+    with _unfollowed("busy"):
+        built = pmu.Page(
+            title=_TITLE, header=[modes.switch(controller.show_mode), again_tour, Status(state, reruns.cancel).panel],
+            main=main, sidebar=sidebar, sidebar_width=330, sidebar_resizable=False, theme_toggle=True,
+            theme_config=_THEME, busy_indicator=None,
+        )  # fmt: skip
     built.param.watch(lambda event: state.param.update(dark=event.new), "dark_theme")
     with param.edit_constant(built):
-        built.busy = False  # it follows every message otherwise, and the browser lays the whole page out anew each time
+        built.busy = False
     return built
+
+
+@contextmanager
+def _unfollowed(name: str) -> Iterator[None]:
+    """Let nothing that is made meanwhile follow a parameter of the server's.
+
+    A page that follows whether the server is busy is laid out anew by the browser at every message; and the server, which is
+    not told when the page is gone, holds it for ever.
+    """
+
+    def followers() -> list[Any]:
+        return list(pn.state.param.watchers.get(name, {}).get("value", ()))
+
+    before = {id(watcher) for watcher in followers()}
+    yield
+    for watcher in followers():
+        if id(watcher) not in before:
+            pn.state.param.unwatch(watcher)
