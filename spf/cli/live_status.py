@@ -56,7 +56,7 @@ def facts(state: FeedState, recording: Recording | None) -> dict[str, Any]:
 def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -> None:
     """Say what was recorded, and what was not."""
     if as_json:
-        ended = {"file": str(recording.path), "complete": True, "ended": recording.ended or None}
+        ended = {"file": str(recording.path), "complete": not recording.ended, "ended": recording.ended or None}
         print(json.dumps({**facts(state, recording), **ended}), flush=True)
         return
     lost = f" {recording.lost} frames could not be recorded." if recording.lost else ""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +50,6 @@ def track_live(
         SensorError: the sensor is not there; no directory is left behind.
     """
     check_free(directory, force)
-    fresh = not output.parent.exists()
-    make_directory(output.parent)
     feed = Feed(open_live(uri), wait=wait)
     feed.record(output, side=request.side, overwrite=force)
     until = float("inf") if seconds is None else time.monotonic() + seconds
@@ -61,13 +59,14 @@ def track_live(
         recording = feed.recording
         return time.monotonic() > until or (recording is not None and recording.ended != "")
 
-    with feed, stopped_by_signals(), status_line(as_json) as show, ExitStack() as stack:
-        try:
-            feed.recording_began()
-        except BaseException:  # Ctrl-C while a sensor is waited for, too
-            if fresh:
-                output.parent.rmdir()
-            raise
+    with (
+        _none_left_empty(output.parent),
+        feed,
+        stopped_by_signals(),
+        status_line(as_json) as show,
+        ExitStack() as stack,
+    ):
+        feed.recording_began()
         take_notes(feed)
         with suppress(KeyboardInterrupt):
             start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
@@ -88,6 +87,20 @@ def track_live(
     if kept is not None and not as_json:
         print(_summary(kept, directory))
     raise_if_ended(recording)
+
+
+@contextmanager
+def _none_left_empty(directory: Path) -> Iterator[None]:
+    """Make a directory; when what follows fails, remove it again, and those made for it, unless there is something in it."""
+    made = [folder for folder in (directory, *directory.parents) if not folder.exists()]
+    make_directory(directory)
+    try:
+        yield
+    except BaseException:  # Ctrl-C while a sensor is waited for, too
+        for folder in made:
+            with suppress(OSError):  # not empty
+                folder.rmdir()
+        raise
 
 
 def _why_nothing(seconds: float | None, found: bool, output: Path) -> str:

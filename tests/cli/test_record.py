@@ -97,9 +97,9 @@ def test_a_sensor_that_is_not_there_leaves_no_run_behind(tmp_path, capsys, monke
             pass
 
     monkeypatch.setattr(live_track, "open_live", lambda _uri: Unplugged())
-    assert execute(["track", "realsense:", "-o", str(tmp_path / "run")]) == 2
+    assert execute(["track", "realsense:", "-o", str(tmp_path / "runs" / "run")]) == 2
     assert "There is no such sensor" in capsys.readouterr().err
-    assert not (tmp_path / "run").exists()
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
