@@ -20,6 +20,7 @@ from spf.cost.spheres import digit_spheres
 from spf.hand.kinematics import pose_hand
 from spf.hand.model import Hand
 from spf.hand.shape import HandShape, lengths_of_digits
+from spf.lens import unlikelihood
 from spf.observation import Observation
 from spf.optimisers.smd import SmdSettings, optimise
 from spf.parallel import map_threads
@@ -58,9 +59,10 @@ class View(NamedTuple):
 def size_by_render(
     views: list[View], shape: HandShape, rng: np.random.Generator
 ) -> tuple[HandShape, list[View], float]:
-    """Average the scales whose renders explain the views, each weighed by how well it does.
+    """Average the scales whose renders explain the views, each weighed by how well it does and by how long hands are.
 
-    Gauss-Newton alone stays near the size that it begins with, because the poses were found with that one.
+    Gauss-Newton alone stays near the size that it begins with, because the poses were found with that one. Renders alone make
+    a hand too large where the sensor does: it widens outlines by up to a pixel.
 
     Returns:
         (shape, views with their poses in that shape, mean golden energy).
@@ -83,7 +85,8 @@ def _averaged_size(
         posed = _repose(_repose(views, hand, settings, descent, stream), hand, settings, descent, stream)
         energies.append(_mean_golden(posed, hand, settings, stream))
     apart = np.array(energies) / min(energies) - 1.0
-    weights = np.exp(-apart / _AS_GOOD)
+    lengths = shape.hand().length * np.array(_SIZES)
+    weights = np.exp(-apart / _AS_GOOD - unlikelihood(lengths))
     sized = shape._replace(scale=shape.scale * float(np.exp(np.log(_SIZES) @ weights / weights.sum())))
     hand = sized.hand()
     posed = _repose(_repose(views, hand, settings, descent, rng), hand, settings, descent, rng)

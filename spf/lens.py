@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from spf.frame import Frame
 
-__all__ = ["Through", "as_seen", "as_stated", "is_believable", "lens_of", "lenses_for", "seen_through"]
+__all__ = ["Through", "as_seen", "as_stated", "is_believable", "lens_of", "lenses_for", "seen_through", "unlikelihood"]
 
 Array = NDArray[np.float64]
 _LENGTH, _SPREAD = 0.187, 0.012  # m, from the wrist to the tip of the middle finger: adults' hands
+_RARE = 2.0  # deviations
 _BELIEVABLE = 0.222  # m, longer than nearly all of them
 _TRIED = (0.205, 0.19, 0.175, 0.16)  # m that the tried lenses give the hand
 _TRUST = 6.0  # nats: one recording in four hundred states a wrong focal length
@@ -79,6 +80,15 @@ class Through(Sequence[Frame]):
 def is_believable(length: float) -> bool:
     """Whether a hand can be so long, m, wrist to tip. Children's hands are small: a short one says nothing."""
     return length <= _BELIEVABLE
+
+
+def unlikelihood(lengths: Array) -> Array:
+    """Return the negative log likelihood, but for a constant, of hands' lengths (N,), m, among adults' hands.
+
+    Beyond two deviations it grows no faster: hands of children, and what a wrong focal length makes of hands, are not rare.
+    """
+    apart = np.abs(np.asarray(lengths) - _LENGTH) / _SPREAD
+    return np.where(apart < _RARE, 0.5 * apart**2, _RARE * (apart - 0.5 * _RARE))
 
 
 def lenses_for(length: float) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from spf.frame import Camera, Frame, Truth
 from spf.hand.kinematics import joints_of
 from spf.hand.shape import HandShape
 from spf.initialise import Start, find_start
-from spf.lens import Through, as_seen, as_stated, is_believable, lens_of, lenses_for, seen_through
+from spf.lens import Through, as_seen, as_stated, is_believable, lens_of, lenses_for, seen_through, unlikelihood
 from spf.manifest import Plan
 from spf.prepare import SessionFrames
 from spf.runs import track_plan
@@ -84,3 +84,10 @@ def test_frames_before_the_first_pose_show_it_in_the_stated_camera_too():
     result = next(track_plan(session, Plan("spf", "default", make_settings("spf"), 0, "auto", 0, 2, start)))
     assert (result.index, result.lost) == (0, True)
     np.testing.assert_allclose(result.joints, as_stated(joints_of(shape.hand(), pose), 1.2))
+
+
+def test_a_length_is_the_less_likely_the_farther_from_the_usual_but_no_faster_than_evenly_far_away():
+    usual, long, longer, longest = unlikelihood(np.array([0.187, 0.205, 0.247, 0.307]))
+    assert usual == 0.0 < long < longer < longest
+    assert (longest - longer) / 0.06 == pytest.approx(2.0 / 0.012)
+    assert unlikelihood(np.array([0.175]))[0] == pytest.approx(0.5)
