@@ -91,7 +91,7 @@ class Controller(Navigation):
         if state.origin is None:
             return
         self.cancel()
-        async with self.doing("") as wanted:
+        async with self.doing("Beginning again") as wanted:
             if not await self.keeper.keep():
                 return
             state.rewind()

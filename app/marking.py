@@ -236,6 +236,8 @@ class Marking(param.Parameterized):
 
     async def embed(self) -> None:
         """Put all marks into the session's own file, in place of the file beside it."""
+        if not self._controller.free():
+            return
         session, marks = self.session, self.marks
         path, size = path_of(session), (session.camera.width, session.camera.height)
         async with self._controller.doing("Writing the marks into the session"):

@@ -10,7 +10,10 @@ import numpy as np
 from app.results import Summary
 from app.state import State
 
-__all__ = ["Pace", "first", "last", "next_loss", "played", "worst"]
+__all__ = ["MOVES", "Pace", "first", "hindered", "last", "next_loss", "played", "worst"]
+
+#: What a visitor can ask the time line for, besides a frame, a range or a speed.
+MOVES = ("play", "step", "back", "first", "last", "worst", "loss", "start", "end", "loop", "restart", "reach")
 
 
 def first(state: State) -> int:
@@ -67,6 +70,40 @@ def played(state: State, stride: int) -> int | None:
     if state.frame < end:
         return min(state.frame + stride, end)
     return begin if state.loop else None
+
+
+def hindered(state: State, move: str) -> str:
+    """Return why a move cannot be made now, in one sentence; nothing when it can.
+
+    Args:
+        state: of the page.
+        move: one of MOVES.
+    """
+    if state.session is None:
+        return "Open a session first."
+    if move == "back":
+        return "" if state.frame > 0 else "This is the first frame."
+    if move in ("last", "worst", "loss") and state.last is None:
+        return "Nothing is tracked yet: press Start."
+    if move == "loss" and not any(summary.lost for lane in state.active for summary in lane.results.summaries):
+        return "The hand was lost in none of the frames tracked."
+    return _hindered_work(state, move) if move in ("play", "step", "restart", "reach") else ""
+
+
+def _hindered_work(state: State, move: str) -> str:
+    """Return why a move that may have to track cannot be made now."""
+    shows_only = state.last is not None and state.frame < state.last
+    if state.playing and move == "play":
+        return ""  # it pauses
+    if state.playing or (state.task and not (move == "step" and shows_only)):
+        return state.occupied
+    if state.origin is None:
+        return "Press Start first."
+    if move == "step" and state.next_frame is None:
+        return "This is the last frame."
+    if move == "reach" and (state.last is None or state.frame <= state.last):
+        return "This frame is tracked already."
+    return ""
 
 
 class Pace:

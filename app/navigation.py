@@ -15,7 +15,7 @@ class Navigation(Work):
 
     async def step(self) -> None:
         """Go on by one frame: show it if it was tracked, else track it."""
-        if self.state.busy:
+        if not self.free():
             return
         async with self.doing("") as wanted:
             await self.advance(wanted)
@@ -23,7 +23,7 @@ class Navigation(Work):
     async def play(self) -> None:
         """Play what was tracked and go on tracking, until the end of the range or session or until paused; or in a loop."""
         state = self.state
-        if state.busy or state.session is None:
+        if state.session is None or not self.free():
             return
         if state.next_frame is None or (state.span and state.frame >= state.span[1]):
             if state.last is None:
@@ -71,7 +71,7 @@ class Navigation(Work):
         state = self.state
         if state.task and state.last is not None and state.frame < state.last:
             self.look(state.frame + 1)
-        elif not state.playing:
+        else:
             await self.step()
 
     def back(self) -> None:

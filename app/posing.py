@@ -121,6 +121,8 @@ class Posing(param.Parameterized):
 
     async def suggest(self) -> None:
         """Place the hand where it is likely in the frame shown."""
+        if not self._controller.free():
+            return
         frame, shape, before = self.frame(), self._shape(), self.placed
         rng = np.random.default_rng([self.state.seed, frame.index])
 
@@ -224,7 +226,7 @@ class Posing(param.Parameterized):
         await self._work("Fitting the hand's shape", self._measuring)
 
     async def _work(self, task: str, make: Callable[[Placed], tuple[Callable[[Report], Placed], str]]) -> None:
-        if self.placed is None or self.state.busy:
+        if self.placed is None or not self._controller.free():
             return
         before, was = self.placed, self.explained
         async with self._controller.doing(task):

@@ -20,6 +20,7 @@ from spf.track import track_frame
 
 __all__ = ["Reruns"]
 
+_READYING = "Keeping what was tracked"
 _SETTLED = 0.25  # s that a frame is shown before its particles are computed again
 
 
@@ -59,11 +60,11 @@ class Reruns:
         begin = max(frame if frame is not None else first, first)
         if begin > goal:
             return
-        if not await self._ready(lane, begin):
-            return
-        self._begin_again(lane, begin)
-        state.show(begin)
-        await self._controller.reach(range(begin, goal + 1), [lane])
+        async with self._controller.doing(_READYING) as wanted:
+            if await self._ready(lane, begin) and wanted():
+                self._begin_again(lane, begin)
+                state.show(begin)
+                await self._controller.reach(range(begin, goal + 1), [lane])
 
     async def again(self, *, other_seed: bool = False) -> None:
         """Track the frame shown once more in the chosen lane, with the present settings and the same or the next seed.
@@ -75,10 +76,10 @@ class Reruns:
             return
         self._controller.cancel()
         lane = state.lane
-        if not await self._ready(lane, frame):
-            return
-        self._begin_again(lane, frame)
-        await self._controller.once_more(frame, lane, other_seed=other_seed)
+        async with self._controller.doing(_READYING) as wanted:
+            if await self._ready(lane, frame) and wanted():
+                self._begin_again(lane, frame)
+                await self._controller.once_more(frame, lane, other_seed=other_seed)
 
     def _begin_again(self, lane: Lane, frame: int) -> None:
         """Have another run that shares with this one what comes before a frame."""
@@ -110,9 +111,9 @@ class Reruns:
         """
         state, controller = self._state, self._controller
         controller.cancel()
-        if not await controller.keeper.keep():
-            return
         async with controller.doing("Opening the run"):
+            if not await controller.keeper.keep():
+                return
             session, work = await self._session_of(run)
             if session is not state.session:
                 if beside and state.session is not None and state.session.fingerprint() != session.fingerprint():

@@ -85,6 +85,8 @@ class State(param.Parameterized):
     landscape_of: tuple[int, int] = param.ClassSelector(class_=tuple, default=(0, 1), doc="entries of the pose")
 
     sending: int = param.Integer(0, doc="counts up when pictures are sent: what changes now goes in the same message")
+    sent: int = param.Integer(0, doc="frame of the pictures that were sent last")
+    awaited: bool = param.Boolean(False, doc="whether pictures are being drawn that will be sent")
     pictured: int = param.Integer(0, doc="counts up when the browser shows what was asked for")
     playing: bool = param.Boolean(False)
     speed: float = param.Number(0.0, bounds=(0.0, None), doc="of playing tracked frames, 1 as recorded; 0 every frame")
@@ -96,6 +98,7 @@ class State(param.Parameterized):
     preparing: str = param.String("", doc="what the server does before it is quick, or nothing")
     error: str = param.String("")
     warning: str = param.String("")
+    answer: str = param.String("", doc="why what the visitor has just asked for is not done, or nothing")
 
     dark: bool = param.Boolean(False, doc="whether the page is dark")
     with_truth: bool = param.Boolean(True, doc="whether the truth is drawn too")
@@ -206,7 +209,19 @@ class State(param.Parameterized):
     @property
     def busy(self) -> bool:
         """Whether something runs in the background."""
-        return bool(self.task) or self.playing
+        return bool(self.occupied)
+
+    @property
+    def occupied(self) -> str:
+        """Why nothing else can begin now, in one sentence; nothing when it can."""
+        if self.playing:
+            return "Frames are being played: pause first."
+        return f"“{self.task}” goes on: wait for its end, or cancel it." if self.task else ""
+
+    @property
+    def pictured_frame(self) -> int:
+        """The frame that the pictures show while playing, which are drawn while the next one is tracked; else the one shown."""
+        return self.sent if self.playing and self.awaited else self.frame
 
     @property
     def entry(self) -> Entry | None:

@@ -73,6 +73,14 @@ class Work:
     def _watch(self, text: str, share: float) -> None:
         self.state.param.update(task=text, share=min(max(share, 0.0), 1.0))
 
+    def free(self) -> bool:
+        """Return whether something can begin now; when it cannot, the visitor is told why.
+
+        A page shows what cannot be done, but a click may be on its way when work begins.
+        """
+        self.state.answer = self.state.occupied
+        return not self.state.answer
+
     @asynccontextmanager
     async def doing(self, task: str) -> AsyncIterator[Wanted]:
         """Say what is being done meanwhile, and afterwards in one sentence what went wrong.
@@ -81,7 +89,7 @@ class Work:
             A function that tells whether it is still wanted: nobody has cancelled it.
         """
         state, turn = self.state, self._turn
-        state.param.update(task=task, share=0.0, left="", error="")
+        state.param.update(task=task, share=0.0, left="", error="", answer="")
         try:
             yield lambda: self._turn == turn
         except CancelledError:
@@ -94,15 +102,15 @@ class Work:
             state.error = (
                 f"Something unexpected went wrong ({type(error).__name__}: {error}); the server's log says more."
             )
-        if self._turn == turn:
-            state.param.update(task="", share=0.0, left="")
+        if self._turn == turn and task:  # else it may be somebody else's by now
+            state.param.update(task="", share=0.0, left="", answer="")
         self.keeper.keep_soon()
 
     def cancel(self) -> None:
         """Give up what runs in the background; everything tracked so far stays."""
         self._turn += 1
         self._runner.cancel()
-        self.state.param.update(playing=False, task="", share=0.0, left="")
+        self.state.param.update(playing=False, task="", share=0.0, left="", answer="")
 
     def close(self) -> None:
         """The page is gone."""
@@ -149,10 +157,9 @@ class Work:
         state, clock = self.state, Clock(len(frames))
         async with self.doing(f"Tracking to frame {frames[-1]}") as wanted:
             for done, index in enumerate(frames, 1):
-                shown = state.frame
                 behind = [lane for lane in lanes or state.active if lane.summary(index) is None]
                 await self.track(index, behind, wanted)
-                state.show(index if shown in (index - 1, index) else state.frame)
+                state.show(index if state.frame in (index - 1, index) else state.frame)
                 state.param.update(share=done / len(frames), left=clock.left(done))
                 self.keeper.keep_sometimes(index)
 

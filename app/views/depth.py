@@ -59,7 +59,8 @@ class Depth:
         while self._wanted:
             self._wanted = False
             try:
-                self._pictures.bring(self.pane, await asyncio.to_thread(self._work()))
+                asked = self._pictures.asked
+                self._pictures.bring(self.pane, await asyncio.to_thread(self._work()), asked)
             except SessionError as error:
                 self._state.error = str(error)
 

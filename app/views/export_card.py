@@ -55,7 +55,7 @@ class ExportCard:
 
     async def export(self, kind: Export) -> None:
         """Make a file of what the page shows and hand it over."""
-        if self._state.busy:
+        if not self._controller.free():
             return
         async with self._controller.doing(kind.task) as wanted:
             asked = wanted_of(self._state, self._folder)

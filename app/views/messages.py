@@ -1,4 +1,4 @@
-"""What went wrong, and what may be wrong: one sentence each."""
+"""What went wrong, what may be wrong, and why something is not done now: one sentence each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["Messages"]
 
 
 class Messages:
-    """Alerts that take no room while there is nothing to say; the visitor may close an error and a warning."""
+    """Alerts that take no room while there is nothing to say; the visitor may close them."""
 
     def __init__(self, state: State) -> None:
         self._state = state
@@ -23,10 +23,14 @@ class Messages:
         self._warning = pmu.Alert(
             severity="warning", closeable=True, variant="outlined", css_classes=["message-warning"], **options
         )
+        self._answer = pmu.Alert(
+            severity="info", closeable=True, variant="outlined", css_classes=["message-answer"], **options
+        )
         self._error.param.watch(lambda event: self._close("error", event.new), "closed")
         self._warning.param.watch(lambda event: self._close("warning", event.new), "closed")
-        state.param.watch(self._follow, ["error", "warning"])
-        self.panel = pmu.Column(self._error, self._warning, sizing_mode="stretch_width", margin=0)
+        self._answer.param.watch(lambda event: self._close("answer", event.new), "closed")
+        state.param.watch(self._follow, ["error", "warning", "answer"])
+        self.panel = pmu.Column(self._error, self._warning, self._answer, sizing_mode="stretch_width", margin=0)
 
     def _close(self, name: str, closed: bool) -> None:
         if closed:
@@ -34,5 +38,6 @@ class Messages:
 
     def _follow(self, *_events: Any) -> None:
         state = self._state
-        for alert, text in ((self._error, state.error), (self._warning, state.warning)):
+        shown = (self._error, state.error), (self._warning, state.warning), (self._answer, state.answer)
+        for alert, text in shown:
             alert.param.update(title=text, visible=bool(text), closed=not text)

@@ -75,7 +75,7 @@ class ThreeD:
         self._view: ViewCamera | None = None  # of the last picture
         self._drawing: asyncio.Task[None] | None = None
         self._is_drawing = False
-        self._brought: dict[Picture, bytes] = {}
+        self._brought: list[tuple[int, Picture, bytes]] = []  # with the request that each was drawn for
         self._asked = self._sent = self._seen = self._before = 0  # requests so far: made, sent, seen, at the last wait
         self._all_shown = asyncio.Event()
         state.param.watch(self.request, ["revision", "task", "preparing", "azimuth", "elevation", "zoom", "playing"])
@@ -90,6 +90,7 @@ class ThreeD:
             return
         self._wanted = True
         self._asked += 1
+        state.awaited = True
         if self._drawing is None or self._drawing.done():
             self._drawing = asyncio.get_running_loop().create_task(self._draw_until_settled())
 
@@ -107,16 +108,22 @@ class ThreeD:
             except TimeoutError:
                 self._seen = self._asked  # nobody is looking: go on without
 
-    def bring(self, pane: Picture, content: bytes) -> None:
-        """Show another picture in one message with those being drawn, for messages are dear; at once while none is.
+    @property
+    def asked(self) -> int:
+        """The number of the last request."""
+        return self._asked
+
+    def bring(self, pane: Picture, content: bytes, asked: int) -> None:
+        """Show another picture in one message with those of its frame, for messages are dear; at once while none is drawn.
 
         Args:
             pane: that shows it, none of these.
             content: a JPEG file.
+            asked: number of the last request when it began to be drawn.
         """
-        self._brought[pane] = content
+        self._brought.append((asked, pane, content))
         if not self._is_drawing:
-            self._send({})
+            self._send({}, self._asked)
 
     def _on_shown(self) -> None:
         self._seen = max(self._seen, self._sent)
@@ -145,6 +152,7 @@ class ThreeD:
                     continue
                 if self._state.playing or not moving:
                     return
+                self._state.awaited = False
                 await asyncio.sleep(_SETTLED)
         except RenderUnavailableError as error:
             for pane in self.panes.values():
@@ -154,10 +162,12 @@ class ThreeD:
         except Exception:
             _log.exception("A 3-D picture could not be drawn")
             self._state.error = "A 3-D picture could not be drawn; the server's log says why."
+        finally:
+            self._state.awaited = False
 
     async def _draw(self, *, sharp: bool) -> None:
         """Draw and send the pictures, and what was brought meanwhile, whether they could be drawn or not."""
-        asked, pictures, self._is_drawing = self._asked, dict[Picture, bytes](), True
+        asked, frame, pictures, self._is_drawing = self._asked, self._state.frame, dict[Picture, bytes](), True
         try:
             pictures = await self._pictures(sharp=sharp)
         finally:
@@ -166,13 +176,16 @@ class ThreeD:
                 self._sent = asked
             else:
                 self._seen = asked
-            self._send(pictures)
+            self._state.sent = frame
+            self._send(pictures, asked)
 
-    def _send(self, pictures: dict[Picture, bytes]) -> None:
+    def _send(self, pictures: dict[Picture, bytes], asked: int) -> None:
+        """Send pictures, with those brought for the same request or one before; what is newer goes with its own."""
+        ready = {pane: content for at, pane, content in self._brought if at <= asked}  # the last of each
         with pn.io.hold():
-            for pane, content in {**self._brought, **pictures}.items():
+            for pane, content in {**ready, **pictures}.items():
                 pane.show(content)
-            self._brought = {}
+            self._brought = [brought for brought in self._brought if brought[0] > asked]
             self._state.sending += 1
 
     async def _pictures(self, *, sharp: bool) -> dict[Picture, bytes]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import panel_material_ui as pmu
 
+from app import moves
 from app.controller import Controller
 from app.lane import Lane
 from app.results import Summary
@@ -23,7 +24,9 @@ from app.views.time_line import TimeLine
 __all__ = ["Transport", "ranges"]
 
 _ROOM = 1.1  # of the chart above its highest value
-_PICTURES_FIRST = 0.1  # s that the time line waits for the pictures of a frame that is played, to come in one message
+_PICTURES_FIRST = (
+    0.1  # s after which the time line goes on while playing where no pictures are drawn; else it comes with them
+)
 _USUAL = 97.0  # percentage of the values that the chart has to hold
 
 
@@ -48,6 +51,10 @@ class Transport(Follower):
 
     async def _wish(self, wish: dict[str, Any]) -> None:
         state, controller, kind = self.state, self._controller, wish["kind"]
+        # A click may be on its way when a move becomes impossible, and a key is always there.
+        state.answer = moves.hindered(state, kind) if kind in moves.MOVES else ""
+        if state.answer:
+            return
         actions: dict[str, Callable[[], object]] = {
             "play": controller.pause if state.playing else controller.play,
             "step": controller.forward, "back": controller.back, "first": controller.first, "last": controller.last,
@@ -68,11 +75,16 @@ class Transport(Follower):
     # ---- what the state says
 
     def _moved(self, *_events: Any) -> None:
-        """Point at the frame at once; while playing together with its pictures, if they come soon."""
+        """Point at the frame at once; while playing together with its pictures, where there are any."""
         if not self.state.playing:
             self._point()
         elif self._late is None:
-            self._late = asyncio.get_running_loop().call_later(_PICTURES_FIRST, self._point)
+            self._late = asyncio.get_running_loop().call_later(_PICTURES_FIRST, self._point_late)
+
+    def _point_late(self) -> None:
+        self._late = None
+        if not self.state.awaited:  # there are none in this tab; those that are drawn bring us along
+            self._point()
 
     def _point(self, *_events: Any) -> None:
         """Say where we are and what can be done: at every frame."""
@@ -81,36 +93,22 @@ class Transport(Follower):
             self._late.cancel()
             self._late = None
         self.line.param.update(
-            count=0 if state.session is None else len(state.session), frame=state.frame, playing=state.playing,
-            span=list(state.span), loop=state.loop, speed=state.speed, can=self._possible(), readout=self._readout(),
-            dark=state.dark,
+            count=0 if state.session is None else len(state.session), frame=state.pictured_frame, playing=state.playing,
+            span=list(state.span), loop=state.loop, speed=state.speed, readout=self._readout(), dark=state.dark,
+            can=[move for move in moves.MOVES if not moves.hindered(state, move)],
         )  # fmt: skip
-
-    def _possible(self) -> list[str]:
-        state, last = self.state, self.state.last
-        if state.session is None:
-            return []
-        ready = state.origin is not None and not state.task
-        possible = {
-            "play": state.playing or (ready and (state.next_frame is not None or last is not None)),
-            "step": not state.playing and ready and state.next_frame is not None,
-            "back": state.frame > 0, "first": True, "last": last is not None, "worst": last is not None,
-            "loss": any(summary.lost for lane in state.active for summary in lane.results.summaries),
-            "start": True, "end": True, "loop": True, "restart": ready,
-            "reach": ready and not state.playing and last is not None and state.frame > last,
-        }  # fmt: skip
-        return [name for name, can in possible.items() if can]
 
     def _readout(self) -> str:
         state = self.state
         if state.session is None:
             return "No session is open."
-        last, summaries = state.last, [lane.summary(state.frame) for lane in state.active]
+        frame, last = state.pictured_frame, state.last
+        summaries = [lane.summary(frame) for lane in state.active]
         tracked = "not tracked" if last is None else f"tracked to {last}"
         took = f" · {1000 * sum(s.seconds for s in summaries if s is not None):.0f} ms" if any(summaries) else ""
-        lost = state.lane.loss(state.frame) if state.mode == "one" else ""
+        lost = state.lane.loss(frame) if state.mode == "one" else ""
         what = f"<span class='lost'>{lost}</span>" if lost else f"{tracked}{took}"
-        return f"<b>Frame {state.frame}</b> of {len(state.session) - 1} · {what}"
+        return f"<b>Frame {frame}</b> of {len(state.session) - 1} · {what}"
 
     def draw(self) -> None:
         """Show what was tracked: seldom while playing."""

@@ -164,16 +164,15 @@ class Recorder:
         return (time_ns - self._first_ns) / 1e9
 
     def _write_all(self) -> None:
-        looked = synced = time.monotonic()
+        began = looked = synced = time.monotonic()
         size = self._writer.size
         try:
             while (item := self._next()) is not None:
                 self._write(item)
                 now = time.monotonic()
                 if now - looked > _LOOK_EVERY:
-                    written = self._writer.size
-                    self._look_at_disk((written - size) / (now - looked))
-                    looked, size = now, written
+                    self._look_at_disk((self._writer.size - size) / (now - began))
+                    looked = now
                 if now - synced > _SYNC_EVERY:
                     self._writer.sync()
                     synced = now

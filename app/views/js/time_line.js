@@ -39,7 +39,7 @@ export function render({ model, el }) {
     button.innerHTML = `<svg viewBox="0 0 24 24" aria-hidden="true"><path d="${path}"/></svg>`;
     button.setAttribute('aria-label', name);
     button.title = key ? `${name} (${key})` : name;
-    button.addEventListener('click', () => act(kind));
+    button.addEventListener('click', () => send(kind));
     buttons[kind] = button;
     bar.append(button);
   }
@@ -210,10 +210,6 @@ export function render({ model, el }) {
   };
 
   // ---- buttons and keys
-  const act = (kind) => {
-    if (!model.can.includes(kind)) return;
-    send(kind);
-  };
   const TYPING = new Set(['INPUT', 'TEXTAREA', 'SELECT']), ROLES = new Set(['slider', 'combobox', 'listbox', 'option', 'radio', 'tab', 'menuitem', 'spinbutton']);
   const onKey = (e) => {
     if (e.ctrlKey || e.metaKey || e.altKey || e.defaultPrevented || !root.isConnected || !root.offsetParent) return;
@@ -228,7 +224,7 @@ export function render({ model, el }) {
     else if (e.key === 'Escape') { if (!keys.hidden) toggleKeys(); else if (model.span.length) send('span', {}); else return; }
     else if (e.shiftKey && (e.key === 'ArrowLeft' || e.key === 'ArrowRight')) {
       send('look', { frame: Math.min(Math.max(model.frame + (e.key === 'ArrowLeft' ? -10 : 10), 0), model.count - 1) });
-    } else if (kind) act(kind);
+    } else if (kind) send(kind);  // what cannot be done is answered
     else return;
     e.preventDefault();
   };
