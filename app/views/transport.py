@@ -24,9 +24,7 @@ from app.views.time_line import TimeLine
 __all__ = ["Transport", "ranges"]
 
 _ROOM = 1.1  # of the chart above its highest value
-_PICTURES_FIRST = (
-    0.1  # s after which the time line goes on while playing where no pictures are drawn; else it comes with them
-)
+_PICTURES_FIRST = 0.1  # s that the time line waits for pictures while playing, where none are being drawn
 _USUAL = 97.0  # percentage of the values that the chart has to hold
 
 
