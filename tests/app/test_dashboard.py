@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import panel as pn
 from bokeh.document import Document
 from panel.io.state import set_curdoc
@@ -13,7 +15,10 @@ def test_the_server_holds_no_page():
     def followers():
         return list(pn.state.param.watchers.get("busy", {}).get("value", ()))
 
+    async def made():  # in a loop, for the page finds one or makes one that nobody closes
+        with set_curdoc(Document()):
+            page()
+
     before = followers()
-    with set_curdoc(Document()):
-        page()
+    asyncio.run(made())
     assert followers() == before
