@@ -92,10 +92,9 @@ def hindered(state: State, move: str) -> str:
 
 def _hindered_work(state: State, move: str) -> str:
     """Return why a move that may have to track cannot be made now."""
-    shows_only = state.last is not None and state.frame < state.last
     if state.playing and move == "play":
         return ""  # it pauses
-    if state.playing or (state.task and not (move == "step" and shows_only)):
+    if state.playing or (state.task and not (move == "step" and state.is_behind)):
         return state.occupied
     if state.origin is None:
         return "Press Start first."

@@ -69,7 +69,7 @@ class Navigation(Work):
     async def forward(self) -> None:
         """Show the next frame, tracking it if it comes right after what was tracked."""
         state = self.state
-        if state.task and state.last is not None and state.frame < state.last:
+        if state.task and state.is_behind:
             self.look(state.frame + 1)
         else:
             await self.step()

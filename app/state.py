@@ -252,6 +252,11 @@ class State(param.Parameterized):
         return all(lane.summary(self.frame) is not None for lane in self.active)
 
     @property
+    def is_behind(self) -> bool:
+        """Whether the frame shown lies before the last one tracked: the next one is only shown, not tracked."""
+        return self.last is not None and self.frame < self.last
+
+    @property
     def next_frame(self) -> int | None:
         """The frame that a step leads to; None before Start and at the end of the session."""
         if self.session is None or self.origin is None:

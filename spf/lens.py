@@ -87,8 +87,13 @@ def unlikelihood(lengths: Array) -> Array:
 
     Beyond two deviations it grows no faster: hands of children, and what a wrong focal length makes of hands, are not rare.
     """
-    apart = np.abs(np.asarray(lengths) - _LENGTH) / _SPREAD
+    apart = np.abs(_deviations(lengths))
     return np.where(apart < _RARE, 0.5 * apart**2, _RARE * (apart - 0.5 * _RARE))
+
+
+def _deviations(lengths: Sequence[float] | Array) -> Array:
+    """By how many deviations hands' lengths (N,), m, are longer than the usual one."""
+    return (np.asarray(lengths) - _LENGTH) / _SPREAD
 
 
 def lenses_for(length: float) -> tuple[float, ...]:
@@ -108,7 +113,7 @@ def lens_of(lenses: Sequence[float], lengths: Sequence[float], goldens: Sequence
         1 where the stated camera is the most likely; else the mean of the others, in the logarithm.
     """
     worse = np.asarray(goldens) / min(goldens) - 1.0
-    unlikely = worse / _AS_GOOD + 0.5 * ((np.asarray(lengths) - _LENGTH) / _SPREAD) ** 2
+    unlikely = worse / _AS_GOOD + 0.5 * _deviations(lengths) ** 2
     unlikely[1:] += _TRUST
     if np.argmin(unlikely) == 0:
         return 1.0

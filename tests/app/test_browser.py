@@ -135,6 +135,14 @@ def past_frame(page, index):
     page.get_by_text(words).filter(visible=True).first.wait_for()
 
 
+def play_past(page, index):
+    """Play until a frame from ``index`` on is shown, and pause."""
+    button(page, "Play").click()
+    past_frame(page, index)
+    button(page, "Pause").click()
+    button(page, "Play").wait_for()
+
+
 def settled(page):
     """Wait until no new picture comes: the sharp one is there."""
 
@@ -209,10 +217,7 @@ def test_a_bundled_session_is_tracked_and_tuned(page):
 
 def test_playing_pausing_jumping_and_orbiting(page):
     start_from_truth(page)
-    button(page, "Play").click()
-    past_frame(page, 3)
-    button(page, "Pause").click()
-    button(page, "Play").wait_for()
+    play_past(page, 3)
     settled(page)
     before = pixels(page, "Reconstructed hand")
     box = picture(page, "Reconstructed hand").bounding_box()

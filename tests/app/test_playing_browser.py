@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 
-from tests.app.test_browser import at_frame, button, page, past_frame, settled, start_from_truth
+from tests.app.test_browser import at_frame, button, page, play_past, settled, start_from_truth
 from tests.app.test_browser import pytestmark as pytestmark
 
 __all__ = ["page"]  # the fixture is used by name
@@ -29,10 +29,7 @@ WATCH = """() => {
 
 def test_the_time_line_says_the_frame_that_the_pictures_show(page):
     start_from_truth(page)
-    button(page, "Play").click()
-    past_frame(page, 9)
-    button(page, "Pause").click()
-    button(page, "Play").wait_for()
+    play_past(page, 9)
     page.keyboard.press("Home")
     at_frame(page, 0)
     settled(page)

@@ -10,9 +10,9 @@ from tests.app.test_browser import (  # the fixture is used by name
     button,
     columns,
     page,
-    past_frame,
     picture,
     pixels,
+    play_past,
     plotted,
     settled,
     start_from_truth,
@@ -131,8 +131,5 @@ def test_the_scene_has_layers_colours_views_and_residuals(page):
     picture(page, "Scene").dblclick()
     settled(page)
     assert np.abs(pixels(page, "Scene") - seen["residuals"]).mean() < 1.0
-    button(page, "Play").click()
-    past_frame(page, 6)
-    button(page, "Pause").click()
-    button(page, "Play").wait_for()
+    play_past(page, 6)
     changed("played")

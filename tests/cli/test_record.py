@@ -7,11 +7,11 @@ import os
 import pty
 import random
 import re
-import shutil
 import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -60,9 +60,7 @@ def filling_disk(monkeypatch):
     """A disk that is full a moment after a recording began."""
     free = iter([10 << 30, *range(200 << 20, 0, -1 << 20)])
     monkeypatch.setattr(recorder, "_LOOK_EVERY", 0.0)
-    monkeypatch.setattr(
-        recorder.shutil, "disk_usage", lambda _path: shutil._ntuple_diskusage(10 << 30, 0, next(free, 0))
-    )
+    monkeypatch.setattr(recorder.shutil, "disk_usage", lambda _path: SimpleNamespace(free=next(free, 0)))
 
 
 @pytest.mark.parametrize("command", ["record", "track"])
