@@ -20,9 +20,10 @@ Image = NDArray[np.float32]
 
 #: Columns of a sensor's faults: displacement of edges (pixels), share of flying pixels at edges, share of edge pixels
 #: lost, white noise (m), grainy noise (m), its grain (pixels), holes (share), size of holes (pixels), slope that is
-#: lost, whether it smooths (0 or 1), quantisation (m).
+#: lost, whether it smooths (0 or 1), quantisation (m), share of the pixels beside an outline that read what is in front.
 FAULTS: tuple[str, ...] = (
     *("ragged", "flying", "eroded", "white", "grainy", "grain", "holes", "hole_size", "steepest", "smooths", "step"),
+    "bloom",
 )
 _EDGE = np.float32(0.02)  # m between neighbours
 _MADE_UP = np.float32(0.04)  # m that flying pixels reach behind an edge beside nothing
@@ -69,7 +70,7 @@ def sense(clean: Image, focal: float, faults: Array, pools: Pools, start: int, s
         seen: (H, W) float32 the measured map, 0 where there is no reading.
     """
     height, width = clean.shape
-    _displace(clean, faults[0], pools.normal, start, spare)
+    _displace(clean, faults[0], faults[11], pools, start, spare)
     for v in range(height):
         for u in range(width):
             z = spare[v, u]
@@ -85,9 +86,10 @@ def sense(clean: Image, focal: float, faults: Array, pools: Pools, start: int, s
 
 
 @part
-def _displace(clean: Image, ragged: float, pool: Image, start: int, displaced: Image) -> None:
-    """Let every pixel read a little beside itself, ``ragged`` pixels on the average."""
+def _displace(clean: Image, ragged: float, bloom: float, pools: Pools, start: int, displaced: Image) -> None:
+    """Let every pixel read a little beside itself, ``ragged`` pixels on the average, and things grow into what is behind them."""
     height, width = clean.shape
+    pool, chances = pools.normal, pools.uniform
     mask = pool.shape[0] - 1
     for v in range(height):
         for u in range(width):
@@ -95,7 +97,22 @@ def _displace(clean: Image, ragged: float, pool: Image, start: int, displaced: I
             dv = int(np.floor(ragged * pool[index(k & mask)] + 0.5))
             du = int(np.floor(ragged * pool[index((k + 1) & mask)] + 0.5))
             row, column = min(max(v + dv, 0), height - 1), min(max(u + du, 0), width - 1)
-            displaced[v, u] = clean[index(row), index(column)]
+            z = clean[index(row), index(column)]
+            if chances[index(k & mask)] < bloom:
+                z = _in_front(clean, index(row), index(column))
+            displaced[v, u] = z
+
+
+@part
+def _in_front(depth: Image, v: int, u: int) -> float:
+    """Nearest depth of a pixel and its four neighbours, where one is in front of it by an edge."""
+    height, width = depth.shape
+    z = nearest = depth[v, u]
+    for dv, du in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        other = depth[min(max(v + dv, 0), height - 1), min(max(u + du, 0), width - 1)]
+        if other > _ZERO and (nearest == _ZERO or other < nearest):
+            nearest = other
+    return nearest if z == _ZERO or z - nearest > _EDGE else z
 
 
 @part

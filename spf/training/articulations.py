@@ -62,8 +62,8 @@ def _gestures(rng: np.random.Generator, n: int) -> Array:
     """Every finger straight, bent or between."""
     drawn = np.zeros((n, 20))
     state = rng.choice(3, size=(n, 4), p=(0.47, 0.4, 0.13))
-    alike = rng.random(n) < 0.3  # all straight, or a fist, whatever the thumb does
-    state[alike] = rng.random((int(alike.sum()), 1)) < 0.4
+    alike = rng.random(n) < 0.35  # all straight, or a fist, whatever the thumb does
+    state[alike] = rng.random((int(alike.sum()), 1)) < 0.55
     mp = np.where(state == 0, rng.normal(3.0, 9.0, (n, 4)), rng.normal(74.0, 16.0, (n, 4)))
     pip = np.where(state == 0, np.abs(rng.normal(3.0, 8.0, (n, 4))), rng.normal(95.0, 14.0, (n, 4)))
     drawn[:, _MP] = np.radians(np.where(state == 2, rng.uniform(0.0, 85.0, (n, 4)), mp))

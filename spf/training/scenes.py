@@ -206,7 +206,8 @@ def _faults(rng: np.random.Generator, n: int) -> Array:
         "steepest": np.where(rng.random(n) < 0.4, rng.uniform(2.5, 7.0, n), 1e6),
         "smooths": (rng.random(n) < 0.4).astype(float),
         "step": rng.choice([0.0001, 0.001, 0.002, 0.004], size=n),
+        "bloom": rng.random(n) * (rng.random(n) < 0.6),
     }
     faults = np.stack([drawn[name] for name in FAULTS], axis=1)
-    faults[clean] = [0.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 4.0, 1e6, 0.0, 0.0001]
+    faults[clean] = [0.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 4.0, 1e6, 0.0, 0.0001, 0.0]
     return faults

@@ -49,7 +49,7 @@ def _random_shape(rng: np.random.Generator) -> HandShape:
     digits = rng.normal(1.0, 0.06) * rng.normal(1.0, 0.05, 5)
     lengths = np.repeat(digits, 3) * rng.normal(1.0, 0.03, 15)
     width, depth = rng.normal(1.0, 0.09, 2).clip(0.75, 1.3)
-    thickness = np.clip(rng.normal(1.0, 0.11), 0.75, 1.35)
+    thickness = np.clip(rng.normal(1.06, 0.14), 0.75, 1.5)
     return HandShape(
         "right",
         float(rng.uniform(0.85, 1.15)),

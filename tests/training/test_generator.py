@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
 from spf.hand.model import load_hand
 from spf.kernels.samples import draw_samples
-from spf.kernels.sensing import FAULTS, Pools
+from spf.kernels.sensing import FAULTS, Pools, sense
 from spf.learned.layout import ARTICULATED, CROP_SIZE, EXTENT_PER_LENGTH
 from spf.training.articulations import draw_articulations
 from spf.training.generator import Generator
@@ -105,3 +106,19 @@ def test_articulations_use_the_whole_range(rng):
         assert low < 5.0
         assert high > 85.0
     assert np.percentile(drawn[:, 4], 97) > 18.0  # abduction
+
+
+def test_a_sensor_that_blooms_widens_a_hand_by_a_pixel():
+    clean = np.zeros((20, 20), np.float32)
+    clean[:, 12:] = 0.9
+    clean[6:14, 6:14] = 0.5
+    seen = [np.empty_like(clean) for _ in range(3)]
+    pools = Pools(np.zeros(1024, np.float32), np.linspace(0.0, 1.0, 1024, endpoint=False, dtype=np.float32))
+    for picture, bloom in zip(seen, (0.0, 0.5, 1.0), strict=True):
+        faults = np.array([(NO_FAULTS | {"bloom": bloom})[name] for name in FAULTS])
+        sense(clean, 20.0, faults, pools, 0, np.empty_like(clean), picture)
+    hand = [np.isclose(picture, 0.5, atol=1e-3) for picture in seen]
+    grown = cv2.dilate((clean == 0.5).astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))) > 0
+    np.testing.assert_array_equal(hand[0], clean == 0.5)
+    np.testing.assert_array_equal(hand[2], grown)
+    assert hand[0].sum() < hand[1].sum() < hand[2].sum()
