@@ -16,7 +16,7 @@ from spf.filters.proposals import curl_digits
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, rotation_about
 from spf.hand.model import Hand, Side, load_hand
-from spf.learned.guesses import Guess, extent_of, guesses, search_hand
+from spf.learned.guesses import Guess, believability, extent_of, guesses, search_hand
 from spf.learned.network import Network
 from spf.observation import Observation
 from spf.optimisers.smd import optimise
@@ -182,7 +182,7 @@ def _looks(points: Array) -> Array:
 def _places(found: list[Guess]) -> list[list[Guess]]:
     """Divide guesses by where they are: a search that mixes a hand with an elbow keeps what explains more, not the hand."""
     groups: list[list[Guess]] = []
-    for guess in sorted(found, key=lambda one: -one.log_weight):
+    for guess in sorted(found, key=believability, reverse=True):
         near = [group for group in groups if np.linalg.norm(guess.pose[:3] - group[0].pose[:3]) < _PLACE]
         if near:
             near[0].append(guess)

@@ -15,7 +15,17 @@ from spf.learned import layout
 from spf.learned.crops import make_crops
 from spf.learned.network import Network
 
-__all__ = ["EXTENTS", "Cubes", "Guess", "decode", "extent_of", "guesses", "search_hand", "side_evidence"]
+__all__ = [
+    "EXTENTS",
+    "Cubes",
+    "Guess",
+    "believability",
+    "decode",
+    "extent_of",
+    "guesses",
+    "search_hand",
+    "side_evidence",
+]
 
 Array = NDArray[np.float64]
 
@@ -237,9 +247,9 @@ def search_hand(
         bests = [group[0] for group in found]
         centres = np.array([best.joints.mean(axis=0) for best in bests])
         extents = np.array([extent_of(scale or float(np.clip(best.scale, *_SCALES))) for best in bests])
-    return sorted((guess for group in found for guess in group), key=_believability, reverse=True)
+    return sorted((guess for group in found for guess in group), key=believability, reverse=True)
 
 
-def _believability(guess: Guess) -> float:
+def believability(guess: Guess) -> float:
     """How much to believe a guess among those of several cubes: weight, and joints that are sure for a hand's size."""
     return guess.log_weight - _SURENESS * float(np.log(guess.joint_sigma / guess.scale).mean())
