@@ -13,6 +13,7 @@ from spf.filters import annealed, condensation, single, smart
 from spf.filters.step import State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
+from spf.nbp import tracker as nbp
 from spf.observation import Observation
 from spf.optimisers import bfgs, gd, lm, powell, smd
 from spf.settings import Settings
@@ -83,6 +84,14 @@ TRACKERS: dict[str, Tracker] = {
             annealed.step,
             "n",
             {"paper": {"n": 500, "layers": 12, "points": 350, "survival": 0.5}},
+        ),
+        Tracker(
+            "nbp",
+            "Nonparametric belief propagation",
+            nbp.NbpSettings,
+            nbp.step,
+            "n",
+            {"paper": {"reach": 3.2, "dynamics": "random-walk"}},
         ),
     )
 }

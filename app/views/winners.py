@@ -14,6 +14,7 @@ __all__ = ["Winners"]
 #: Proposal → colour, after Okabe and Ito; in the order of the rows.
 _COLOURS = {
     "dynamics": "#0072b2", "structured": "#d55e00", "learned": "#009e73", "recombined": "#cc79a7", "estimate": "#44505c",
+    "beliefs": "#56b4e9",
 }  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from spf.kernels.skinning import skin, skin_forces, skin_velocities
 __all__ = [
     "PosedHand",
     "angles_of",
+    "frames_of_each",
     "joint_jacobian",
     "joints_of",
     "joints_of_each",
@@ -96,6 +97,11 @@ def joints_of_each(hand: Hand, poses: ArrayLike, reference: ArrayLike | None = N
     joints = np.empty((len(p), len(hand.joint_bone), 3))
     joints_of_poses(hand.skeleton, hand.joint_bone, hand.joint_offset, p, axes, joints)
     return joints
+
+
+def frames_of_each(hand: Hand, poses: ArrayLike, reference: ArrayLike | None = None) -> Array:
+    """Return T_camera_bone (N, 16, 3, 4) of poses (N, D); see :func:`pose_hand` for ``reference``."""
+    return np.array([_frames(chain, p) for p, chain in (_chain(hand, pose, reference) for pose in np.asarray(poses))])
 
 
 def _place_joints(hand: Hand, frames: Array) -> Array:

@@ -27,11 +27,12 @@ CHEAP: dict[str, dict[str, str]] = {
     "lm": {"rounds": "2"},
     "condensation": {"n": "40"},
     "apf": {"n": "30", "layers": "3"},
+    "nbp": {"n": "20", "iterations": "2"},
 }
 
 #: Bound of the mean joint error, mm, after the frames of the slow session, from the truth and with the defaults.
 HELD: dict[str, float] = {
-    "spf": 8.0, "smd": 16.0, "gd": 16.0, "bfgs": 8.0, "powell": 8.0, "lm": 8.0, "condensation": 16.0, "apf": 20.0,
+    "spf": 8.0, "smd": 16.0, "gd": 16.0, "bfgs": 8.0, "powell": 8.0, "lm": 8.0, "condensation": 16.0, "apf": 20.0, "nbp": 16.0,
 }  # fmt: skip
 FRAMES = 5
 

@@ -15,7 +15,7 @@ from spf.track import begin, track_frame
 from spf.trackers import TRACKERS, make_settings
 
 SAMPLE = Path(__file__).parents[2] / "sessions" / "open-close.mcap"
-SMALL = {"condensation": {"n": "20"}, "apf": {"n": "20", "layers": "3"}}
+SMALL = {"condensation": {"n": "20"}, "apf": {"n": "20", "layers": "3"}, "nbp": {"n": "20"}}
 
 
 def second_frame(tracker, changes=None):
