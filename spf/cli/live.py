@@ -20,9 +20,11 @@ from spf.cli.live_status import (
     stopped_by_signals,
     summarise_recording,
     take_notes,
+    wait_for_sensor,
 )
 from spf.cli.live_track import track_live
 from spf.cli.sessions import Force
+from spf.errors import SensorError
 from spf.live import SENSORS, Feed, open_live
 from spf.live.network import Publisher
 from spf.live.tracking import Request
@@ -64,10 +66,11 @@ def record(
         request = Request("spf", "default", make_settings("spf", "default", {}), side=checked_side(side))
         track_live(uri, run, output, request, seconds=seconds, wait=wait, force=force, as_json=as_json)
         return
-    feed = Feed(open_live(uri), wait=wait)
+    source = open_live(uri)
+    feed = Feed(source, wait=wait)
     feed.record(output, side=checked_side(side), overwrite=force)
     with feed, stopped_by_signals(), status_line(as_json) as show:
-        feed.recording_began()
+        wait_for_sensor(uri, source, feed, feed.recording_began, show, seconds=seconds, wait=wait)
         take_notes(feed)
         until = float("inf") if seconds is None else time.monotonic() + seconds
         with suppress(KeyboardInterrupt):  # the way that a recording without --seconds is ended
@@ -78,7 +81,7 @@ def record(
     summarise_recording(recording, state, as_json)
     if not as_json:
         print(f"Next: spf track {recording.path} -o RUN")
-    raise_if_ended(recording)
+    raise_if_ended(recording, state)
 
 
 def stream(
@@ -94,22 +97,25 @@ def stream(
     """
     publisher = Publisher(to)
     try:
-        with (
-            Feed(open_live(uri), wait=wait, send=publisher.send) as feed,
-            stopped_by_signals(),
-            status_line(as_json) as show,
-            suppress(KeyboardInterrupt),
-        ):
+        source = open_live(uri)
+        with Feed(source, wait=wait, send=publisher.send) as feed, stopped_by_signals(), status_line(as_json) as show:
+            wait_for_sensor(uri, source, feed, feed.opened, show, seconds=seconds, wait=wait)
             sensor = feed.about().sensor
             port = publisher.address.rpartition(":")[2]
             complain(
                 f"{sensor} is sent from {publisher.address}; there: spf track zmq://{socket.gethostname()}:{port} -o RUN"
             )
-            _watch(feed, float("inf") if seconds is None else time.monotonic() + seconds, show)
+            with suppress(KeyboardInterrupt):  # the way that it is ended without --seconds
+                _watch(feed, float("inf") if seconds is None else time.monotonic() + seconds, show)
+            state = feed.state
     finally:
         publisher.close()
     if not as_json:
-        print(f"Sent {feed.state.taken} frames of {sensor}.")
+        print(f"Sent {state.taken} frames of {sensor}.")
+    if state.failed:
+        raise SensorError(state.message)
+    if not state.taken:
+        raise SensorError(f"{sensor} gave no frame, so that nothing was sent: {source.remedy}.")
 
 
 def _watch(feed: Feed, until: float, show: Any) -> None:
@@ -118,12 +124,12 @@ def _watch(feed: Feed, until: float, show: Any) -> None:
     while time.monotonic() < until:
         state, recording = feed.state, feed.recording
         show(facts(state, recording))
+        if state.ended or (recording is not None and recording.ended):
+            return
         sentence = ("" if recording is None else recording.warning) or state.message
         if sentence != told:
             told = sentence
             warn(sentence)
-        if state.ended or (recording is not None and recording.ended):
-            return
         feed.newest(state.taken - 1, min(STATUS_EVERY, max(until - time.monotonic(), 0.0)))
         time.sleep(min(STATUS_EVERY, max(until - time.monotonic(), 0.0)))
 
