@@ -88,6 +88,7 @@ def facts(state: FeedState, recording: Recording | None) -> dict[str, Any]:
         found |= {
             "recorded": recording.frames,
             "not_recorded": recording.lost,
+            "notes_not_recorded": recording.notes_lost,
             "queued": recording.queued,
             "recorded_s": round(recording.seconds, 3),
             "megabytes": round(recording.size / 1e6, 3),
@@ -102,10 +103,11 @@ def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -
         print(json.dumps({**facts(state, recording), **ended}), flush=True)
         return
     lost = f" {recording.lost} frames could not be recorded." if recording.lost else ""
+    notes = f" {recording.notes_lost} markers and notes could not be recorded." if recording.notes_lost else ""
     missing = f" {state.missing} frames were lost between the sensor and this computer." if state.missing else ""
     print(
         f"Recorded {recording.frames} frames ({recording.seconds:.1f} s, {recording.size / 1e6:.1f} MB) to "
-        f"{recording.path}.{lost}{missing}"
+        f"{recording.path}.{lost}{notes}{missing}"
     )
 
 
@@ -163,8 +165,11 @@ def take_notes(feed: Feed) -> None:
     def read() -> None:
         for line in sys.stdin:
             text = line.strip()
-            if feed.note("note" if text else "marker", text):
-                complain(f"noted: {text}" if text else "marker set.")
+            kept = feed.note("note" if text else "marker", text)
+            if text:
+                complain(f"noted: {text}" if kept else f"not noted, as nothing is recorded any more: {text}")
+            else:
+                complain("marker set." if kept else "no marker set, as nothing is recorded any more.")
 
     threading.Thread(target=read, name="notes", daemon=True).start()
 

@@ -147,12 +147,9 @@ class Feed:
         return None if recorder is None else recorder.close()
 
     def note(self, kind: str, text: str) -> bool:
-        """Put a marker, note or event into the recording; returns whether one is being made."""
+        """Put a marker, note or event into the recording; returns whether one is being made that takes it."""
         with self._changed:
-            if self._recorder is None:
-                return False
-            self._recorder.note(kind, text)
-            return True
+            return self._recorder is not None and self._recorder.note(kind, text)
 
     @property
     def recording(self) -> Recording | None:
