@@ -24,7 +24,7 @@ from spf.cli.live_status import (
 )
 from spf.cli.live_track import track_live
 from spf.cli.sessions import Force
-from spf.errors import SensorError
+from spf.errors import SensorError, SettingError
 from spf.live import SENSORS, Feed, open_live
 from spf.live.network import Publisher
 from spf.live.tracking import Request
@@ -33,10 +33,20 @@ from spf.trackers import make_settings
 __all__ = ["COMMANDS", "Seconds", "Wait", "record", "stream"]
 
 LiveSensor = Annotated[
-    str, typer.Argument(metavar="URI", help=f"A live sensor: {', '.join(s.example for s in SENSORS.values())}.")
+    str,
+    typer.Argument(
+        metavar="URI",
+        help=f"A live sensor: {', '.join(s.example for s in SENSORS.values())}; what is in [] may be left out, and is quoted "
+        "in a shell. 'spf doctor' lists the cameras that are connected.",
+    ),
 ]
-Wait = Annotated[bool, typer.Option("--wait", help="Wait for a sensor that is not there yet.")]
-Seconds = Annotated[float | None, typer.Option(min=0.1, help="Stop a live sensor after so long; else at Ctrl-C.")]
+Wait = Annotated[
+    bool, typer.Option("--wait", help="Wait for a live sensor that is not there yet, for as long as it takes.")
+]
+Seconds = Annotated[
+    float | None,
+    typer.Option(min=0.1, help="End a live sensor so many seconds after its first frame; without, Ctrl-C ends it."),
+]
 
 
 def record(
@@ -44,24 +54,31 @@ def record(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.mcap", help="The file to record to.")],
     seconds: Seconds = None,
     side: Annotated[str | None, typer.Option(metavar="left|right", help="Which hand is shown, if you know.")] = None,
-    run: Annotated[Path | None, typer.Option("--track", metavar="DIR", help="Track meanwhile, to this run.")] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option("--track", metavar="DIR", help="Track at the same time, and keep the run in this directory."),
+    ] = None,
     wait: Wait = False,
     force: Force = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON twice a second.")] = False,
 ) -> None:
     """Record a live sensor; every frame counted as recorded is in the file, whatever happens to the program.
 
-    Press Enter to set a marker; write something before it to make a note.
+    Ctrl-C ends a recording and leaves a whole file. Enter sets a marker; a line of text and Enter make a note.
 
-    Fails when the disk gets full; what was recorded until then is kept.
+    Fails when the disk gets full, or when no frame comes; what was recorded until then is kept.
 
     Examples:
+
+        spf record realsense: -o recording.mcap --seconds 60
 
         spf record replay:sessions/open-close.mcap -o recording.mcap --seconds 3
 
         spf record replay:sessions/open-close.mcap -o tracked.mcap --track runs/live
     """
     check_output(output, force)
+    if run is not None and run.resolve() == output.resolve():
+        raise SettingError("--track takes a directory, and --output a file: give them different names.")
     if run is not None:
         request = Request("spf", "default", make_settings("spf", "default", {}), side=checked_side(side))
         track_live(uri, run, output, request, seconds=seconds, wait=wait, force=force, as_json=as_json)
@@ -86,14 +103,21 @@ def record(
 
 def stream(
     uri: LiveSensor,
-    to: Annotated[str, typer.Option("--to", metavar="tcp://*:PORT", help="Where others connect to.")],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="tcp://*:PORT",
+            help="Where others connect to: a free port of this computer, quoted in a shell.",
+        ),
+    ],
     seconds: Seconds = None,
     wait: Wait = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON twice a second.")] = False,
 ) -> None:
     """Send a live sensor to other computers: they record or track zmq://THIS-COMPUTER:PORT.
 
-    Example:  spf stream replay:sessions/open-close.mcap --to tcp://*:5555 --seconds 3
+    Example:  spf stream replay:sessions/open-close.mcap --to "tcp://*:5555" --seconds 3
     """
     publisher = Publisher(to)
     try:

@@ -128,7 +128,9 @@ def test_a_time_too_short_to_track_in_is_named(made, tmp_path, capsys, monkeypat
     ("arguments", "said"),
     [
         (["replay:nowhere"], "There is no file or folder nowhere"),
-        (["leap:"], "leap: is no live sensor; there are realsense:"),
+        (["leap:"], "leap: is no live sensor; there are realsense:, oak:, zmq://HOST:PORT and replay:SESSION."),
+        (["s.mcap"], "a recording is played as if it were one with replay:s.mcap."),
+        (["replay:s", "--sidde", "left"], "(see spf record --help)"),
         (["replay:s", "--side", "up"], "--side takes left or right"),
     ],
 )
@@ -136,6 +138,11 @@ def test_mistakes_are_told(tmp_path, capsys, arguments, said):
     assert execute(["record", *arguments, "-o", str(tmp_path / "r.mcap")]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "r.mcap").exists()
+
+
+def test_a_run_and_its_recording_cannot_have_one_name(tmp_path, capsys):
+    assert execute(["record", "replay:s", "-o", str(tmp_path / "r"), "--track", str(tmp_path / "r")]) == 2
+    assert "--track takes a directory, and --output a file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
