@@ -134,8 +134,12 @@ class LiveCard:
 
     def _set_mark(self, _event: Any) -> None:
         text = (self._note.value_input or self._note.value).strip()
-        if self.live is not None and self.live.note(text):
+        if self.live is None:
+            return
+        if self.live.note(text):
             self._note.param.update(value="", value_input="")
+        else:
+            self._state.error = "The marker was not kept, as nothing is recorded any more."
 
     async def _open_recorded(self, _event: Any) -> None:
         path = self._recorded
@@ -213,9 +217,10 @@ def told(facts: LiveFacts) -> str:
     recording = facts.recording
     if recording is not None:
         lost = f", <b>{recording.lost} not recorded</b>" if recording.lost else ""
+        notes = f", <b>{recording.notes_lost} markers and notes not kept</b>" if recording.notes_lost else ""
         lines.append(
             f"<span style='color:#c62828'>●</span> Recording {html.escape(recording.path.name)}: {recording.frames} frames, "
-            f"{recording.seconds:.0f} s, {recording.size / 1e6:.1f} MB{lost}"
+            f"{recording.seconds:.0f} s, {recording.size / 1e6:.1f} MB{lost}{notes}"
         )
     warnings = [
         text for text in (facts.error, facts.warning, feed.message, recording.warning if recording else "") if text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import typer
 
@@ -22,17 +22,23 @@ app = typer.Typer(
     "A first walk through it:\n\n"
     "    spf info sessions/open-close.mcap\n\n"
     "    spf track sessions/open-close.mcap -o runs/first\n\n"
-    "    spf evaluate runs/first",
+    "    spf evaluate runs/first\n\n"
+    "'spf COMMAND --help' says what a command takes. 'panel serve app' opens the same in a browser.",
     add_completion=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-_COMMANDS = (
-    *sessions.COMMANDS, *tracking.COMMANDS, *live.COMMANDS, *marking.COMMANDS, *results.COMMANDS, *sharing.COMMANDS,
-)  # fmt: skip
-for command in _COMMANDS:
-    app.command()(command)
-app.command(name="compare")(comparing.compare_trackers)
+_PANELS: dict[str, tuple[Callable[..., None], ...]] = {
+    "Sessions": (*sessions.COMMANDS, *marking.COMMANDS),
+    "Tracking": tracking.COMMANDS,
+    "Live sensors": live.COMMANDS,
+    "Runs": (results.evaluate, *sharing.COMMANDS),
+    "This computer": (results.doctor,),
+}
+for panel, commands in _PANELS.items():
+    for command in commands:
+        app.command(rich_help_panel=panel)(command)
+app.command(name="compare", rich_help_panel="Runs")(comparing.compare_trackers)
 
 
 @app.callback()
@@ -51,7 +57,9 @@ def execute(arguments: Sequence[str]) -> int:
     except SpfError as error:
         complain(str(error))
     except _USAGE_ERROR as error:
-        complain(f"{error.format_message()} (see spf --help)")  # type: ignore[attr-defined]
+        context = error.ctx  # type: ignore[attr-defined]
+        command = "spf" if context is None else context.command_path
+        complain(f"{error.format_message()} (see {command} --help)")  # type: ignore[attr-defined]
     except KeyboardInterrupt:
         complain("stopped.")
         return INTERRUPTED

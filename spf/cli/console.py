@@ -16,7 +16,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from spf import __version__
 from spf.errors import RunError, SessionError, SettingError
 from spf.initialise import Doubted, Start
-from spf.live import is_live
+from spf.live import is_live, is_meant_live, open_live
 from spf.progress import Report
 from spf.sessions import Session, open_session
 
@@ -94,6 +94,7 @@ def open_given(uri: str, camera: Path | None = None) -> Session:
 
     Raises:
         SessionError: it cannot be opened.
+        SensorError: it is written like a live sensor that there is not.
     """
     if is_live(uri) and uri.startswith("replay:"):
         raise SessionError(
@@ -101,6 +102,8 @@ def open_given(uri: str, camera: Path | None = None) -> Session:
         )
     if is_live(uri):
         raise SessionError(f"{uri} is a live sensor: 'spf record {uri} -o FILE' records it, 'spf track' tracks it.")
+    if is_meant_live(uri):
+        open_live(uri)
     with progress_bar() as report:
         session = open_session(uri, camera, report)
     for sentence in session.warnings:

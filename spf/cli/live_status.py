@@ -6,16 +6,18 @@ import json
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
 from rich.status import Status
 
-from spf.cli.console import complain
-from spf.errors import RunError, SettingError
-from spf.live import Feed, FeedState, Recording
+from spf.cli.console import complain, warn
+from spf.errors import RunError, SensorError, SettingError
+from spf.live import Feed, FeedState, LiveSource, Recording
+from spf.live.feed_state import CONNECTING
 from spf.sessions import Side
 
 __all__ = [
@@ -27,9 +29,49 @@ __all__ = [
     "stopped_by_signals",
     "summarise_recording",
     "take_notes",
+    "wait_for_sensor",
 ]
 
 STATUS_EVERY = 0.5  # s
+_PATIENCE = 20.0  # s for a first frame where no time is given: longer than what sensors themselves wait for one
+
+
+def wait_for_sensor(
+    uri: str,
+    source: LiveSource,
+    feed: Feed,
+    came: Callable[[float], bool],
+    show: Callable[[dict[str, Any]], None],
+    *,
+    seconds: float | None,
+    wait: bool,
+) -> None:
+    """Wait until a sensor gives what is asked for, and say meanwhile why it does not.
+
+    Args:
+        uri: of the sensor.
+        source: that the feed runs, of that URI.
+        feed: that was started.
+        came: waits for so many seconds; tells whether it has come.
+        show: called with how the feed stands.
+        seconds: that ``--seconds`` gives the sensor: one that gives nothing for so long, and could, is waited for no more.
+        wait: whether it is waited for as long as it takes.
+
+    Raises:
+        SensorError: it did not come in time.
+    """
+    limit = float("inf") if wait else max(_PATIENCE if seconds is None else seconds, source.warm_up)
+    until, told = time.monotonic() + limit, CONNECTING
+    while not came(min(STATUS_EVERY, max(until - time.monotonic(), 0.0))):
+        state = feed.state
+        if time.monotonic() >= until:
+            raise SensorError(
+                f"No frame came from {uri} within {limit:g} s: {source.remedy}, or have it waited for with --wait."
+            )
+        show(facts(state, None))
+        if state.message not in ("", told):
+            told = state.message
+            warn(told)
 
 
 def facts(state: FeedState, recording: Recording | None) -> dict[str, Any]:
@@ -46,6 +88,7 @@ def facts(state: FeedState, recording: Recording | None) -> dict[str, Any]:
         found |= {
             "recorded": recording.frames,
             "not_recorded": recording.lost,
+            "notes_not_recorded": recording.notes_lost,
             "queued": recording.queued,
             "recorded_s": round(recording.seconds, 3),
             "megabytes": round(recording.size / 1e6, 3),
@@ -60,23 +103,25 @@ def summarise_recording(recording: Recording, state: FeedState, as_json: bool) -
         print(json.dumps({**facts(state, recording), **ended}), flush=True)
         return
     lost = f" {recording.lost} frames could not be recorded." if recording.lost else ""
+    notes = f" {recording.notes_lost} markers and notes could not be recorded." if recording.notes_lost else ""
     missing = f" {state.missing} frames were lost between the sensor and this computer." if state.missing else ""
     print(
         f"Recorded {recording.frames} frames ({recording.seconds:.1f} s, {recording.size / 1e6:.1f} MB) to "
-        f"{recording.path}.{lost}{missing}"
+        f"{recording.path}.{lost}{notes}{missing}"
     )
 
 
-def raise_if_ended(recording: Recording) -> None:
-    """Let the command fail when the recording ended by itself; what it has is said by then.
+def raise_if_ended(recording: Recording, state: FeedState) -> None:
+    """Let the command fail when the recording or its sensor ended by a fault; how much was recorded is said by then.
 
     Raises:
-        RunError: it did.
+        RunError: the recording did.
+        SensorError: the sensor did.
     """
     if recording.ended:
-        raise RunError(
-            f"{recording.ended} {recording.path} has {recording.frames} frames; make room and go on in another file."
-        )
+        raise RunError(f"{recording.ended} Make room and go on in another file.")
+    if state.failed:
+        raise SensorError(f"{state.message} What was recorded until then is kept in {recording.path}.")
 
 
 @contextmanager
@@ -120,8 +165,11 @@ def take_notes(feed: Feed) -> None:
     def read() -> None:
         for line in sys.stdin:
             text = line.strip()
-            if feed.note("note" if text else "marker", text):
-                complain(f"noted: {text}" if text else "marker set.")
+            kept = feed.note("note" if text else "marker", text)
+            if text:
+                complain(f"noted: {text}" if kept else f"not noted, as nothing is recorded any more: {text}")
+            else:
+                complain("marker set." if kept else "no marker set, as nothing is recorded any more.")
 
     threading.Thread(target=read, name="notes", daemon=True).start()
 

@@ -19,6 +19,7 @@ from spf.cli.live_status import (
     stopped_by_signals,
     summarise_recording,
     take_notes,
+    wait_for_sensor,
 )
 from spf.errors import RunError
 from spf.evaluate import count_losses
@@ -50,10 +51,10 @@ def track_live(
         SensorError: the sensor is not there; no directory is left behind.
     """
     check_free(directory, force)
-    feed = Feed(open_live(uri), wait=wait)
+    source = open_live(uri)
+    feed = Feed(source, wait=wait)
     feed.record(output, side=request.side, overwrite=force)
-    until = float("inf") if seconds is None else time.monotonic() + seconds
-    kept, start = None, None
+    until, kept, start = float("inf"), None, None
 
     def stop() -> bool:
         recording = feed.recording
@@ -66,8 +67,10 @@ def track_live(
         status_line(as_json) as show,
         ExitStack() as stack,
     ):
-        feed.recording_began()
+        wait_for_sensor(uri, source, feed, feed.recording_began, show, seconds=seconds, wait=wait)
         take_notes(feed)
+        if seconds is not None:
+            until = time.monotonic() + seconds
         with suppress(KeyboardInterrupt):
             start = find_live_start(feed, request, lambda text, _share: show({"doing": text}), stop)
             if start is not None and not stop():  # else there is no frame left to track, and a run of none helps nobody
@@ -81,12 +84,12 @@ def track_live(
             kept.finish()
     assert recording is not None
     summarise_recording(recording, state, as_json)
-    if kept is None and not recording.ended:
+    if kept is None and not recording.ended and not state.failed:
         over = time.monotonic() > until
         raise RunError(_why_nothing(seconds if over else None, start is not None, output))
     if kept is not None and not as_json:
         print(_summary(kept, directory))
-    raise_if_ended(recording)
+    raise_if_ended(recording, state)
 
 
 @contextmanager

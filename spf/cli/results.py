@@ -13,7 +13,7 @@ from spf.doctor import examine, table
 from spf.evaluate import evaluate_run
 from spf.runs import read_run, reopen_session
 
-__all__ = ["COMMANDS", "doctor", "evaluate"]
+__all__ = ["doctor", "evaluate"]
 
 _LONG = ("success_curve", "joint_error_mm")  # parts for programs, not for a table
 
@@ -64,6 +64,3 @@ def doctor(as_json: AsJson = False) -> None:
         print(table(checks))
     if not all(check.ok for check in checks):
         raise typer.Exit(1)
-
-
-COMMANDS = (evaluate, doctor)

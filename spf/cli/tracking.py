@@ -87,7 +87,11 @@ def _description(start: Start) -> str:
 def track(
     output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Directory of the run.")],
     session: Annotated[
-        str | None, typer.Argument(metavar="SESSION", help="An MCAP file, a folder of depth images or a live sensor.")
+        str | None,
+        typer.Argument(
+            metavar="SESSION",
+            help="A recording, a file or a folder (docs/formats.md), or a live sensor (spf record --help).",
+        ),
     ] = None,
     tracker: Annotated[str | None, typer.Option(help=f"One of {', '.join(TRACKERS)}; spf if not given.")] = None,
     preset: Annotated[
@@ -117,6 +121,8 @@ def track(
 ) -> None:
     """Track the hand of a session or a live sensor; the track and all that is needed to repeat it go to a directory.
 
+    A live sensor is recorded into that directory, too (docs/live.md).
+
     Examples:
 
         spf track sessions/open-close.mcap -o runs/a
@@ -127,7 +133,7 @@ def track(
 
         spf track --repeat runs/b -o runs/c
 
-        spf track replay:sessions/open-close.mcap -o runs/live
+        spf track realsense: -o runs/live --seconds 60
     """
     check_free(output, force)
     warn(available_network()[1])

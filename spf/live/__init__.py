@@ -5,7 +5,7 @@ This package's own names need no tracker: a headless box that only records or se
 
 from spf.live.feed import Feed
 from spf.live.feed_state import FeedState, Taken
-from spf.live.opening import SENSORS, is_live, open_live
+from spf.live.opening import SENSORS, is_live, is_meant_live, open_live
 from spf.live.recorder import Recorder, Recording
 from spf.live.source import About, Capture, LiveSource
 
@@ -20,5 +20,6 @@ __all__ = [
     "Recording",
     "Taken",
     "is_live",
+    "is_meant_live",
     "open_live",
 ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Self
 
 from spf.errors import SensorError, SessionError
-from spf.live.feed_state import FeedState, Taken
+from spf.live.feed_state import CONNECTING, FeedState, Taken
 from spf.live.recorder import Recorder, Recording
 from spf.live.source import About, Capture, LiveSource
 from spf.sessions import Side
@@ -43,7 +43,7 @@ class Feed:
         self._source, self._wait, self._retry = source, wait, retry
         self._changed = threading.Condition()
         self._stop = threading.Event()
-        self._state = FeedState(None, False, "Connecting.", 0, 0, 0, 0.0, 0, False)
+        self._state = FeedState(None, False, CONNECTING, 0, 0, 0, 0.0, 0, False, False)
         self._newest: Taken | None = None
         self._recorder: Recorder | None = None
         self._record: Callable[[About, Capture], Recorder] | None = None
@@ -77,14 +77,19 @@ class Feed:
         with self._changed:
             return self._state
 
+    def opened(self, timeout: float | None = None) -> bool:
+        """Wait until the sensor was open once, or cannot be; returns whether that came in time (s)."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._state.about is not None or self._state.ended, timeout)
+
     def about(self) -> About:
         """Wait until the sensor was open once, and return what it is.
 
         Raises:
             SensorError: it cannot be opened and is not waited for.
         """
+        self.opened()
         with self._changed:
-            self._changed.wait_for(lambda: self._state.about is not None or self._state.ended)
             if self._state.about is None:
                 raise SensorError(self._state.message)
             return self._state.about
@@ -118,21 +123,22 @@ class Feed:
         with self._changed:
             self._record, self._record_error = make, None
 
-    def recording_began(self) -> None:
-        """Wait until the recording that was asked for has its first frame.
+    def recording_began(self, timeout: float | None = None) -> bool:
+        """Wait until the recording that was asked for has its first frame; returns whether that came in time (s).
 
         Raises:
             SessionError: the file cannot be made.
             SensorError: the sensor gives no more frames.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._record is None or self._state.ended)
+            in_time = self._changed.wait_for(lambda: self._record is None or self._state.ended, timeout)
             if self._record_error is not None:
                 raise self._record_error
             if self._failure is not None:
                 raise self._failure
-            if self._record is not None:
+            if in_time and self._record is not None:
                 raise SensorError(self._state.message)
+            return in_time
 
     def stop_recording(self) -> Recording | None:
         """End the recording, whole; returns how it stands, None if there is none."""
@@ -141,12 +147,9 @@ class Feed:
         return None if recorder is None else recorder.close()
 
     def note(self, kind: str, text: str) -> bool:
-        """Put a marker, note or event into the recording; returns whether one is being made."""
+        """Put a marker, note or event into the recording; returns whether one is being made that takes it."""
         with self._changed:
-            if self._recorder is None:
-                return False
-            self._recorder.note(kind, text)
-            return True
+            return self._recorder is not None and self._recorder.note(kind, text)
 
     @property
     def recording(self) -> Recording | None:
@@ -170,10 +173,11 @@ class Feed:
         """Open the source, trying again and again once it was open or when it is waited for; False if that is over."""
         while not self._stop.is_set():
             try:
-                about = self._source.open()
+                about = self._source.open(self._stop.is_set)
             except SensorError as error:
                 self._update(message=str(error))
                 if not self._wait and self.state.about is None:
+                    self._update(failed=True)
                     return False
                 self._stop.wait(self._retry)
                 continue
@@ -181,7 +185,10 @@ class Feed:
             if before.about is not None:
                 if (before.about.camera, before.about.depth_unit) != (about.camera, about.depth_unit):
                     self._source.close()
-                    self._update(message="The sensor came back with another image size or camera: begin anew with it.")
+                    self._update(
+                        message="The sensor came back with another image size or camera: begin anew with it.",
+                        failed=True,
+                    )
                     return False
                 self._update(reconnected=before.reconnected + 1)
                 self.note("event", "The sensor came back.")

@@ -9,7 +9,9 @@ import numpy as np
 from spf.frame import Frame
 from spf.live.source import About, Capture
 
-__all__ = ["FeedState", "Taken"]
+__all__ = ["CONNECTING", "FeedState", "Taken"]
+
+CONNECTING = "Connecting."  # the message before anything is known
 
 
 class Taken(NamedTuple):
@@ -47,6 +49,7 @@ class FeedState(NamedTuple):
         rate: captures per second, lately.
         reconnected: how often the sensor came back.
         ended: whether no more will come.
+        failed: whether it ended by a fault of the sensor, which ``message`` names.
     """
 
     about: About | None
@@ -58,3 +61,4 @@ class FeedState(NamedTuple):
     rate: float
     reconnected: int
     ended: bool
+    failed: bool

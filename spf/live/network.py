@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,6 +119,9 @@ class NetworkSource(LiveSource):
         SensorError: pyzmq is not installed, or the URI is wrong.
     """
 
+    warm_up = 3.0
+    remedy = "start 'spf stream URI --to tcp://*:PORT' there and see that no firewall closes the port"
+
     def __init__(self, uri: LiveUri) -> None:
         uri.check_options({})
         self._zmq = import_extra("zmq", "stream")
@@ -130,7 +133,7 @@ class NetworkSource(LiveSource):
         self._socket: Any = None
         self._first: Message | None = None
 
-    def open(self) -> About:
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> About:
         """Connect, and wait for a first message.
 
         Raises:
@@ -144,10 +147,10 @@ class NetworkSource(LiveSource):
         self._socket = socket
         try:
             socket.connect(self._address)
-            if not socket.poll(int(_FIRST * 1e3)):
-                raise SensorError(
-                    f"Nothing comes from {self._address}: is 'spf stream URI --to tcp://*:PORT' running there, and the port open?"
-                )
+            until = time.monotonic() + _FIRST
+            while not socket.poll(int(_LOOK * 1e3)):
+                if stopped() or time.monotonic() > until:
+                    raise SensorError(f"Nothing comes from {self._address}: {self.remedy}.")
             self._first = decode(socket.recv_multipart())
         except self._zmq.ZMQError as error:
             self.close()

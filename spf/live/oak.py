@@ -90,6 +90,9 @@ class Oak(LiveSource):
         SensorError: an option is wrong, or the extra is not installed.
     """
 
+    warm_up = _FIRST
+    remedy = "unplug the camera and plug it in again"
+
     def __init__(self, uri: LiveUri, opener: Callable[..., Opened] = open_stereo) -> None:
         uri.check_options(_OPTIONS)
         if uri.place:
@@ -100,7 +103,7 @@ class Oak(LiveSource):
         self._opened: Opened | None = None
         self._first: Any = None
 
-    def open(self) -> About:
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> About:
         """Start the pipeline and wait for its first frame, which says what camera took it.
 
         Raises:
@@ -112,9 +115,9 @@ class Oak(LiveSource):
             raise self._said(error) from error
         until = time.monotonic() + _FIRST
         while (first := self._next()) is None:
-            if time.monotonic() > until:
+            if stopped() or time.monotonic() > until:
                 self.close()
-                raise SensorError(f"The OAK camera has sent no depth for {_FIRST:g} s: unplug it and plug it in again.")
+                raise SensorError(f"The OAK camera has sent no depth for {_FIRST:g} s: {self.remedy}.")
         self._first = first
         try:
             camera = self._camera(first)

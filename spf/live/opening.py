@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from spf.live.replay import Replay
 from spf.live.source import LiveSource
 from spf.live.uri import LiveUri, parse_live_uri
 
-__all__ = ["SENSORS", "Sensor", "is_live", "open_live"]
+__all__ = ["SENSORS", "Sensor", "is_live", "is_meant_live", "open_live"]
 
 
 class Sensor(NamedTuple):
@@ -44,6 +45,11 @@ def is_live(text: str | Path) -> bool:
     return bool(colon) and scheme in SENSORS and not Path(text).exists()
 
 
+def is_meant_live(text: str) -> bool:
+    """Tell whether a text is written like the URI of a live source, known or not, and is no path that is there."""
+    return re.match(r"[A-Za-z]{2,}:", text) is not None and not Path(text).exists()  # one letter: a drive
+
+
 def open_live(text: str) -> LiveSource:
     """Return the source that a URI names, not yet open.
 
@@ -52,7 +58,8 @@ def open_live(text: str) -> LiveSource:
     """
     uri = parse_live_uri(text)
     if uri.scheme not in SENSORS:
-        known = ", ".join(sensor.example for sensor in SENSORS.values())
-        meant = "" if ":" in text else f" A recording is played as if it were live with replay:{text}."
-        raise SensorError(f"{text} is no live sensor; there are {known}.{meant}")
+        if ":" not in text or Path(text).exists():
+            raise SensorError(f"{text} is no live sensor: a recording is played as if it were one with replay:{text}.")
+        *others, last = (sensor.example.partition("[")[0] for sensor in SENSORS.values())
+        raise SensorError(f"{text} is no live sensor; there are {', '.join(others)} and {last}.")
     return SENSORS[uri.scheme].make(uri)

@@ -75,6 +75,8 @@ class RealSense(LiveSource):
         SensorError: an option is wrong, or the extra is not installed.
     """
 
+    remedy = "unplug the camera and plug it in again, at a USB 3 port"
+
     def __init__(self, uri: LiveUri, devices: Callable[[], list[Any]] | None = None) -> None:
         uri.check_options(_OPTIONS)
         if uri.place:
@@ -89,7 +91,7 @@ class RealSense(LiveSource):
         self._sensor: Any = None
         self._queue: Any = None
 
-    def open(self) -> About:
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> About:
         """Open the depth sensor and start it.
 
         Raises:

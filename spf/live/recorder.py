@@ -35,7 +35,8 @@ class Recording(NamedTuple):
         path: the file.
         frames: acknowledged: they are in the file.
         queued: not yet written.
-        lost: that could not be recorded because the disk was too slow, or after it was full.
+        lost: frames that could not be recorded because the disk was too slow, or after it was full.
+        notes_lost: markers, notes and events that could not be recorded because a write had failed.
         seconds: from the first to the last acknowledged frame.
         size: bytes written.
         seconds_left: until the disk is full, at the present rate; inf while it is not known.
@@ -47,6 +48,7 @@ class Recording(NamedTuple):
     frames: int
     queued: int
     lost: int
+    notes_lost: int
     seconds: float
     size: int
     seconds_left: float
@@ -99,7 +101,7 @@ class Recorder:
         self._queue: deque[Capture | Note] = deque()
         self._changed = threading.Condition()
         self._closing = False
-        self._accepted, self._lost, self._frames_queued = 0, 0, 0
+        self._accepted, self._lost, self._notes_lost, self._frames_queued = 0, 0, 0, 0
         self._missed = 0  # frames lost since the last one that was accepted
         self._last_ns = self._first_ns
         self._free, self._rate, self._ended = float("inf"), 0.0, ""
@@ -127,12 +129,19 @@ class Recorder:
             self._changed.notify()
             return self._accepted - 1
 
-    def note(self, kind: str, text: str, now: float | None = None) -> None:
-        """Add a marker, a note or an event at this instant (``now`` of ``time.monotonic()``)."""
+    def note(self, kind: str, text: str, now: float | None = None) -> bool:
+        """Add a marker, a note or an event at this instant (``now`` of ``time.monotonic()``).
+
+        Returns:
+            whether it was taken; a recording that has ended takes none.
+        """
         moment = time.monotonic() if now is None else now
         with self._changed:
+            if self._ended or self._closing:
+                return False
             self._queue.append(Note(moment - self._began, kind, text))
             self._changed.notify()
+            return True
 
     @property
     def state(self) -> Recording:
@@ -142,8 +151,8 @@ class Recorder:
             within = next((step for step in _WARN if left < step), None)
             warning = "" if within is None or self._ended else f"The disk is full in less than {within} s: make room."
             return Recording(
-                self._path, len(self._writer), self._frames_queued, self._lost, self._seconds(self._last_ns),
-                self._writer.size, left, warning, self._ended,
+                self._path, len(self._writer), self._frames_queued, self._lost, self._notes_lost,
+                self._seconds(self._last_ns), self._writer.size, left, warning, self._ended,
             )  # fmt: skip
 
     def close(self) -> Recording:
@@ -179,27 +188,37 @@ class Recorder:
             self._writer.close()
         except SessionError as error:
             self._end(str(error))
-            with self._changed:
-                self._lost += 1 + self._frames_queued
-                self._queue.clear()
-                self._frames_queued = 0
+            self._give_up_queue()
+
+    def _give_up_queue(self) -> None:
+        """Count what can no longer be written, frames and notes each by themselves."""
+        with self._changed:
+            self._lost += self._frames_queued
+            self._notes_lost += len(self._queue) - self._frames_queued
+            self._queue.clear()
+            self._frames_queued = 0
 
     def _next(self) -> Capture | Note | None:
-        """Wait for what is to be written next; None at the end."""
+        """Wait for what is to be written next, and leave it in the queue until it is; None at the end."""
         with self._changed:
             while not self._queue:
                 if self._closing or self._ended:
                     return None
                 self._changed.wait()
-            item = self._queue.popleft()
+            return self._queue[0]
+
+    def _written(self, item: Capture | Note) -> None:
+        with self._changed:
+            self._queue.popleft()
             self._frames_queued -= isinstance(item, Capture)
-            return item
 
     def _write(self, item: Capture | Note) -> None:
         if isinstance(item, Note):
             self._writer.add_note(item)
+            self._written(item)
             return
         self._writer.write_raw(item.time_ns - self._first_ns, item.raw, item.colour)
+        self._written(item)
         self._last_ns = item.time_ns
         if self._acknowledge is not None:
             self._acknowledge(len(self._writer) - 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from urllib.parse import urlencode
 
 import numpy as np
@@ -30,6 +30,9 @@ class Replay(LiveSource):
         SensorError: an option is wrong.
     """
 
+    warm_up = float("inf")
+    remedy = "look at the recording with 'spf info'"
+
     def __init__(self, uri: LiveUri) -> None:
         uri.check_options(_OPTIONS)
         self._uri = uri
@@ -37,7 +40,7 @@ class Replay(LiveSource):
         self._loop = bool(uri.number("loop", 0, 0, 1))
         self._session: Session | None = None
 
-    def open(self) -> About:
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> About:
         """Open the session.
 
         Raises:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +57,22 @@ class Capture(NamedTuple):
 
 
 class LiveSource(ABC):
-    """A sensor, or what stands for one. One thread uses it; after :meth:`close` it can be opened again."""
+    """A sensor, or what stands for one. One thread uses it; after :meth:`close` it can be opened again.
+
+    Attributes:
+        warm_up: seconds within which one that is there gives its first frame; inf where it always gives one or says why not.
+        remedy: what a user does when no frame comes, as the middle of a sentence.
+    """
+
+    warm_up: ClassVar[float] = 5.0
+    remedy: ClassVar[str] = "unplug the sensor and plug it in again"
 
     @abstractmethod
-    def open(self) -> About:
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> About:
         """Connect to the sensor and start it.
+
+        Args:
+            stopped: asked while it waits for something that may never come; True ends that soon, as if it were missing.
 
         Raises:
             SensorError: it is missing, busy, not permitted or cannot do what is asked; one sentence that says what to do.

@@ -158,6 +158,7 @@ class MCAPWriter:
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
+            self._abandon()
             raise self._unwritable(error) from error
 
     def _append(
@@ -203,7 +204,7 @@ class MCAPWriter:
             os.truncate(self.path, self._whole)
 
     def _unwritable(self, error: OSError) -> UnwritableError:
-        return UnwritableError(self.path, error, f"The {self._count} frames before are safe in it.")
+        return UnwritableError(self.path, error, "What was recorded before is safe in it.")
 
     def close(self) -> None:
         """Write the index and close the file.

@@ -80,14 +80,15 @@ def test_a_sensor_that_is_missing_is_told_and_waited_for():
 
 
 def test_what_is_told():
-    state = FeedState(None, False, "Unplugged. <Trying> again.", 100, 3, 0, 29.7, 2, False)
+    state = FeedState(None, False, "Unplugged. <Trying> again.", 100, 3, 0, 29.7, 2, False, False)
     recording = Recording(
-        Path("r.mcap"), 90, 1, 4, 3.0, 2_500_000, 60.0, "The disk is full in about 60 s: make room.", ""
+        Path("r.mcap"), 90, 1, 4, 2, 3.0, 2_500_000, 60.0, "The disk is full in about 60 s: make room.", ""
     )
     text = told(LiveFacts("Tracking", state, recording, 28.0, (31.4, 58.8), 7, 2, "The side may be wrong", ""))
     for part in (
         "30 frames/s", "tracked 28/s", "latency 31 ms, 95 % under 59 ms", "7 dropped for newer ones", "hand lost in 2",
         "3 lost before this computer", "connected again 2×", "90 frames, 3 s, 2.5 MB", "4 not recorded",
+        "2 markers and notes not kept",
         "The disk is full in about 60 s", "&lt;Trying&gt;", "The side may be wrong",
     ):  # fmt: skip
         assert part in text

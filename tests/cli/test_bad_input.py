@@ -59,6 +59,7 @@ TRACK = "track good.mcap -o new --init truth"
 
 CASES = {
     "no session": ("info missing", "no file or folder"),
+    "no sensor": ("track leap: -o new", "leap: is no live sensor; there are realsense:"),
     "empty folder": ("info nothing", "an empty folder"),
     "no session file": ("info text.txt", "no reader knows"),
     "torn MCAP": ("info torn.mcap", "torn"),

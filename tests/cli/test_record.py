@@ -75,17 +75,17 @@ def test_a_disk_that_gets_full_fails_the_command_and_keeps_what_was_recorded(
     out = tmp_path / "r.mcap" if command == "record" else tmp_path / "run"
     file = out if command == "record" else out / "session.mcap"
     assert execute([command, f"replay:{made.path}?loop=1", "-o", str(out), "--seconds", "60"]) == 2
-    said = capsys.readouterr().err
+    said = capsys.readouterr()
     kept = len(open_session(file))
     assert kept > 0
-    assert (
-        f"The disk is nearly full: the recording was ended, what is recorded is safe. {file} has {kept} frames" in said
-    )
+    assert f"Recorded {kept} frames" in said.out
+    ended = "The disk is nearly full: the recording was ended, what is recorded is safe. Make room and go on in another"
+    assert ended in said.err
 
 
 def test_a_sensor_that_is_not_there_leaves_no_run_behind(tmp_path, capsys, monkeypatch):
     class Unplugged(LiveSource):
-        def open(self):
+        def open(self, stopped):
             raise SensorError("There is no such sensor: plug it in.")
 
         def captures(self):
@@ -128,7 +128,9 @@ def test_a_time_too_short_to_track_in_is_named(made, tmp_path, capsys, monkeypat
     ("arguments", "said"),
     [
         (["replay:nowhere"], "There is no file or folder nowhere"),
-        (["leap:"], "leap: is no live sensor; there are realsense:"),
+        (["leap:"], "leap: is no live sensor; there are realsense:, oak:, zmq://HOST:PORT and replay:SESSION."),
+        (["s.mcap"], "a recording is played as if it were one with replay:s.mcap."),
+        (["replay:s", "--sidde", "left"], "(see spf record --help)"),
         (["replay:s", "--side", "up"], "--side takes left or right"),
     ],
 )
@@ -136,6 +138,11 @@ def test_mistakes_are_told(tmp_path, capsys, arguments, said):
     assert execute(["record", *arguments, "-o", str(tmp_path / "r.mcap")]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "r.mcap").exists()
+
+
+def test_a_run_and_its_recording_cannot_have_one_name(tmp_path, capsys):
+    assert execute(["record", "replay:s", "-o", str(tmp_path / "r"), "--track", str(tmp_path / "r")]) == 2
+    assert "--track takes a directory, and --output a file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

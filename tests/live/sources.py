@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class Scripted(LiveSource):
         self.opened = self.closed = 0
         self._stamps = first_stamp_ns
 
-    def open(self) -> About:
+    def open(self, stopped: Callable[[], bool] = lambda: False) -> About:
         script = self.scripts[min(self.opened, len(self.scripts) - 1)]
         self.opened += 1
         if isinstance(script, SensorError):

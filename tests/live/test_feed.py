@@ -95,6 +95,24 @@ def test_a_sensor_that_is_not_there_at_first():
             feed.recording_began()
 
 
+def test_a_first_frame_can_be_waited_for_with_an_end(tmp_path):
+    come = threading.Event()
+
+    def script():
+        while not come.wait(0.002):
+            yield None
+        yield 0
+
+    with Feed(Scripted(script())) as feed:
+        feed.record(tmp_path / "r.mcap")
+        assert feed.opened(10)
+        assert not feed.recording_began(0.01)
+        come.set()
+        assert feed.recording_began(10)
+        finish(feed)
+        assert not feed.state.failed
+
+
 def test_a_sensor_that_comes_back_as_another_one_ends_the_feed():
     source = Scripted([0, SensorError("Unplugged.")], [0])
     with Feed(source, retry=0.2) as feed:
@@ -102,6 +120,7 @@ def test_a_sensor_that_comes_back_as_another_one_ends_the_feed():
         source.about = ABOUT._replace(camera=CAMERA._replace(fx=99.0))
         finish(feed)
         assert "came back with another image size or camera" in feed.state.message
+        assert feed.state.failed
 
 
 def test_recordings_are_begun_and_ended_while_it_runs(tmp_path):

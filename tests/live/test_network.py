@@ -139,8 +139,11 @@ def test_a_sender_that_begins_anew_is_taken_up_again(monkeypatch):
 
 def test_nothing_there_and_wrong_addresses(monkeypatch, publisher):
     monkeypatch.setattr(network, "_FIRST", 0.05)
-    with pytest.raises(SensorError, match=r"Nothing comes from tcp://127\.0\.0\.1:.* is 'spf stream"):
+    with pytest.raises(SensorError, match=r"Nothing comes from tcp://127\.0\.0\.1:.* start 'spf stream"):
         open_live(uri_of(publisher)).open()
+    monkeypatch.setattr(network, "_FIRST", 1e6)
+    with pytest.raises(SensorError, match="Nothing comes from"):
+        open_live(uri_of(publisher)).open(lambda: True)
     with pytest.raises(SensorError, match="must name a host and a port"):
         open_live("zmq://box")
     with pytest.raises(SensorError, match="ports go up to 65535"):  # ZeroMQ would take 34463

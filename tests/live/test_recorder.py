@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -128,10 +129,57 @@ def test_a_write_that_fails_half_way_loses_no_acknowledged_frame(tmp_path):
     frames, lost, ended = done.stdout.split(" ", 2)
     session = open_session(path)
     assert 5 < len(session) == int(frames) == 40 - int(lost)
-    assert f"cannot be written: File too large. The {frames} frames before are safe in it" in ended
+    assert "cannot be written: File too large. What was recorded before is safe in it" in ended
     assert "nothing but its index is missing" in session.warnings[0]
     for number in range(len(session)):
         np.testing.assert_array_equal(session.raw_depth(number), raw_of(number))
+
+
+def gone(*_: object) -> None:
+    raise OSError(errno.EIO, "Input/output error")
+
+
+def test_a_note_that_cannot_be_written_is_no_lost_frame(tmp_path, monkeypatch):
+    with Recorder(tmp_path / "r.mcap", ABOUT, capture(0)) as recording:
+        recording.offer(capture(0))
+        while recording.state.frames < 1:
+            time.sleep(0.001)
+        monkeypatch.setattr(MCAPWriter, "_add", gone)
+        assert recording.note("marker", "")
+        while not recording.state.ended:
+            time.sleep(0.001)
+        assert not recording.note("note", "too late")
+    state = recording.state
+    assert (state.frames, state.lost, state.notes_lost) == (1, 0, 1)
+    assert state.ended.endswith("r.mcap cannot be written: Input/output error. What was recorded before is safe in it.")
+
+
+def test_what_is_queued_behind_a_failed_write_is_counted_by_kind(tmp_path, monkeypatch):
+    hold = threading.Event()
+
+    def fail(*_: object) -> None:
+        hold.wait()
+        gone()
+
+    monkeypatch.setattr(MCAPWriter, "_add", fail)
+    with Recorder(tmp_path / "r.mcap", ABOUT, capture(0)) as recording:
+        for number in range(3):
+            recording.offer(capture(number))
+        recording.note("note", "thumb bent")
+        hold.set()
+    state = recording.state
+    assert (state.frames, state.queued, state.lost, state.notes_lost) == (0, 0, 3, 1)
+
+
+def test_a_failed_sync_loses_nothing_that_is_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorder, "_SYNC_EVERY", 0.0)
+    monkeypatch.setattr(os, "fsync", gone)
+    with Recorder(tmp_path / "r.mcap", ABOUT, capture(0)) as recording:
+        recording.offer(capture(0))
+        while not recording.state.ended:
+            time.sleep(0.001)
+    assert (recording.state.frames, recording.state.lost) == (1, 0)
+    np.testing.assert_array_equal(open_session(tmp_path / "r.mcap").raw_depth(0), raw_of(0))
 
 
 def test_a_device_without_room_is_told(tmp_path):

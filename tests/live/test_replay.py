@@ -83,8 +83,8 @@ def test_what_is_chosen_of_a_recording_is_chosen_of_its_replay(tmp_path, rng):
         ("replay:x?speed", "has options that cannot be read"),
         ("replay:x?speed=1&speed=2", "gives an option twice"),
         ("replay:x?size=3", "has no option size"),
-        ("leap:", r"is no live sensor; there are .*replay:SESSION\S+$"),
-        ("wave.mcap", r"A recording is played as if it were live with replay:wave\.mcap\."),
+        ("leap:", r"is no live sensor; there are .*zmq://HOST:PORT and replay:SESSION\.$"),
+        ("wave.mcap", r"a recording is played as if it were one with replay:wave\.mcap\."),
     ],
 )
 def test_mistakes_are_told(uri, said):

@@ -29,7 +29,7 @@ class Held(LiveSource):
     def __init__(self, session) -> None:
         self.session, self.allowed = session, 0
 
-    def open(self) -> About:
+    def open(self, stopped=lambda: False) -> About:
         return About("held", self.session.camera, self.session.depth_unit, 30.0, self.session.side)
 
     def captures(self):
