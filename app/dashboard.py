@@ -64,6 +64,8 @@ def _theme(primary: str) -> dict[str, Any]:
                         "backgroundColor": f"{_BLUE} !important",
                         "color": "white",
                         "& .MuiTypography-root": {"whiteSpace": "nowrap"},
+                        "& .MuiToolbar-root > .MuiBox-root:last-of-type": {"minWidth": 0},
+                        "@media (max-width: 899px)": {"& .title": {"display": "none"}},
                     }
                 }
             },
@@ -101,7 +103,8 @@ def page() -> pmu.Page:
     }  # fmt: skip
     tour = Tour(parts, width=0, height=0, margin=0)
     again_tour = pmu.Button(
-        label="Tour", icon="explore", size="small", variant="text", color="default", margin=(8, 4), sx={"color": "white"},
+        label="Tour", icon="explore", size="small", variant="text", color="default", margin=(8, 4),
+        sx={"color": "white", "@media (max-width: 639px)": {"display": "none"}},
         on_click=lambda _event: tour.begin(),
     )  # fmt: skip
     live = LiveCard(state, controller.open, SAMPLES, kernels().wait)

@@ -124,7 +124,8 @@ class Lane(param.Parameterized):
     def title(self) -> str:
         """The tracker, its preset unless that is the default one, and what differs from it."""
         parts = [TRACKERS[self.tracker].title] + ([self.preset] if self.preset != "default" else [])
-        return " · ".join(parts + [f"{name} {_short(now)}" for name, (_, now) in self.differences.items()])
+        called = self.settings.called()
+        return " · ".join(parts + [f"{called[name]} {_short(now)}" for name, (_, now) in self.differences.items()])
 
     # ---- the run
 

@@ -158,7 +158,8 @@ def _preview(job: _Job, observation: Observation) -> Preview:
     elif settings != how.settings:
         was, now = how.settings.to_dict(), settings.to_dict()
         changed = {name for name, value in now.items() if value != was[name]}
-        later = sorted(changed - SEEN_AT_ONCE)
+        called = settings.called()
+        later = sorted(called[name] for name in changed - SEEN_AT_ONCE)
         if "weighting" in changed or getattr(settings, "weighting", "") == "laplace":
             note = _DRAWN
         else:

@@ -43,6 +43,11 @@ class SettingInfo(NamedTuple):
     meaning: str
     group: str
 
+    @property
+    def called(self) -> str:
+        """What a sentence calls it: the paper's symbol where there is one, else its name in words."""
+        return self.symbol or self.name.replace("_", " ")
+
 
 def setting(
     default: Any,
@@ -90,6 +95,11 @@ class Settings:
             SettingInfo(name=field.name, kind=type(field.default), default=field.default, **field.metadata)
             for field in dataclasses.fields(cls)
         )
+
+    @classmethod
+    def called(cls) -> dict[str, str]:
+        """Return name → what a sentence calls the setting."""
+        return {info.name: info.called for info in cls.describe()}
 
     def to_dict(self) -> dict[str, Any]:
         """Return name → value, ready for JSON."""

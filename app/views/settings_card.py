@@ -168,7 +168,8 @@ class SettingsCard:
                 field.value = values[name]
         changed = lane.differences
         self._back.visible = bool(changed)
-        words = ", ".join(f"{name} {_short(was)} → {_short(now)}" for name, (was, now) in changed.items())
+        called = lane.settings.called()
+        words = ", ".join(f"{called[name]} {_short(was)} → {_short(now)}" for name, (was, now) in changed.items())
         style = "font:12px/1.4 Roboto,sans-serif;color:"
         self._hint.object = (
             f"<div style='{style}var(--warning-text-color,#8a4b00)'>Differs from the preset: {words}</div>"

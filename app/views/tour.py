@@ -30,8 +30,9 @@ STEPS = (
          "of one. Help, above, explains the method.", "export"),
 )  # fmt: skip
 
-_FRAME = {"outline": "3px solid #e69f00", "outline-offset": "-3px", "border-radius": "6px"}
-_NO_FRAME = {"outline": "none"}  # said, for a style that is left out stays in the browser
+_ROOM = {"padding-top": "8px"}  # between the frame and the label of a part's first field, which stands above its field
+_FRAME = {**_ROOM, "outline": "3px solid #e69f00", "outline-offset": "-3px", "border-radius": "6px"}
+_NO_FRAME = {**_ROOM, "outline": "none"}  # said, for a style that is left out stays in the browser
 
 
 class Tour(JSComponent):
@@ -107,6 +108,7 @@ class Tour(JSComponent):
     def __init__(self, parts: Mapping[str, Any], **params: Any) -> None:
         super().__init__(**params)
         self._parts = dict(parts)
+        self._frame("")
 
     def begin(self) -> None:
         """Show the first step, whether the tour was seen or not."""
@@ -114,6 +116,9 @@ class Tour(JSComponent):
 
     def _handle_msg(self, msg: dict[str, Any]) -> None:
         step = int(msg["step"])
-        framed = STEPS[step].part if 0 <= step < len(STEPS) else ""
+        self._frame(STEPS[step].part if 0 <= step < len(STEPS) else "")
+
+    def _frame(self, framed: str) -> None:
+        """Frame a part; "" for none. No part moves when its frame comes or goes."""
         for name, panel in self._parts.items():
             panel.styles = _FRAME if name == framed else _NO_FRAME

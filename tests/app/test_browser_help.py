@@ -1,5 +1,7 @@
 """Tour, help, exports and accessibility, as a visitor meets them in a real browser; no request leaves the machine."""
 
+import re
+
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 
@@ -27,6 +29,28 @@ def serious(page):
         for finding in found
         if finding["impact"] in ("serious", "critical")
     }
+
+
+FRAMED = """() => {
+  const framed = (root) => {
+    for (const it of root.querySelectorAll('*')) {
+      if (getComputedStyle(it).outlineColor === 'rgb(230, 159, 0)' && getComputedStyle(it).outlineWidth === '3px') return it;
+      const inside = it.shadowRoot && framed(it.shadowRoot);
+      if (inside) return inside;
+    }
+    return null;
+  };
+  return framed(document)?.getBoundingClientRect().top;
+}"""
+
+
+def test_the_tour_s_frame_keeps_clear_of_labels(page):
+    button(page, "Tour").click()
+    for label in ("Session", "First pose"):
+        page.wait_for_timeout(500)
+        words = page.locator("label", has_text=re.compile(f"^{label}$")).filter(visible=True).first.bounding_box()
+        assert words["y"] >= page.evaluate(FRAMED) + 3 + 1  # the frame's width, and air
+        button(page, "Next").click()
 
 
 def test_the_first_visit_gets_a_tour_and_the_second_none(page):

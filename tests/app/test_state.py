@@ -5,6 +5,7 @@ import pytest
 
 from app.lane import Origin
 from app.state import State
+from app.views.settings_card import SettingsCard
 from spf.hand import HandShape
 from spf.initialise import Start
 from spf.trackers import PRESETS, make_settings
@@ -19,9 +20,18 @@ def test_a_change_is_told_apart_from_the_preset_and_undone(state):
     state.change("k", 3.0)
     state.change("n", 8)
     assert state.lane.differences == {"k": (make_settings("spf").k, 3.0), "n": (4, 8)}
+    assert state.lane.title == "Smart Particle Filter · k 3 · N 8"
     state.lane.back_to_preset()
     assert state.lane.settings == make_settings("spf")
     assert state.lane.differences == {}
+
+
+def test_the_list_of_what_differs_uses_the_paper_s_symbols(state):
+    card = SettingsCard(state)
+    for name, value in {"mu": 0.05, "n": 8, "data_points": 300}.items():
+        state.change(name, value)
+    told = card._hint.object
+    assert all(change in told for change in ("μ 0.02 → 0.05", "N 4 → 8", "data points ")), told
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -90,7 +90,7 @@ def test_what_cannot_be_seen_at_once_is_said(page, sample):
         await weighed(state)
 
     asyncio.run(asyncio.wait_for(scene(), 120))
-    assert "n: seen when the frame is tracked again" in state.preview.note
+    assert "N: seen when the frame is tracked again" in state.preview.note
     previewer.close()
 
 
