@@ -148,8 +148,8 @@ def _watch(feed: Feed, until: float, show: Any) -> None:
     while time.monotonic() < until:
         state, recording = feed.state, feed.recording
         show(facts(state, recording))
-        if state.ended or (recording is not None and recording.ended):
-            return
+        if state.ended or state.failed or (recording is not None and recording.ended):
+            return  # a failure is said at the end
         sentence = ("" if recording is None else recording.warning) or state.message
         if sentence != told:
             told = sentence

@@ -132,7 +132,7 @@ def _follow(feed: Feed, request: Request, kept: LiveRun, stop: Callable[[], bool
             shown = now
             doing = "lost, searching" if tracked.result.lost else "tracking"
             show({"doing": doing, **latency_facts(list(lately)), "dropped": dropped, **facts(state, recording)})
-            sentence = recording.warning or state.message
+            sentence = recording.warning or ("" if state.failed else state.message)  # a failure is said at the end
             if sentence != told:
                 told = sentence
                 warn(sentence)
