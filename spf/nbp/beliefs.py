@@ -20,7 +20,7 @@ from spf.nbp.mixture import Mixture, log_density, mixture_of, reweighed, sample_
 from spf.observation import Observation
 from spf.settings import setting
 
-__all__ = ["BeliefSettings", "Model", "propagate", "start_messages"]
+__all__ = ["BeliefSettings", "Messages", "Model", "propagate"]
 
 Array = NDArray[np.float64]
 _GROUP = "Belief propagation"
@@ -66,12 +66,7 @@ class Model(NamedTuple):
     anchors: Array
 
 
-Messages = dict[tuple[int, int], Mixture]
-
-
-def start_messages() -> Messages:
-    """No messages: before the first iteration bodies know of nothing but the last frame."""
-    return {}
+Messages = dict[tuple[int, int], Mixture]  # (from, to) → message
 
 
 def propagate(
@@ -81,7 +76,7 @@ def propagate(
 
     Args:
         model: of the frame.
-        messages: of the last iteration, (from, to) → message.
+        messages: of the last iteration, none in the first: bodies then know of nothing but the last frame.
         before: beliefs of the last iteration; the temporal messages in the first.
         count: M, samples of a belief.
         rng: randomness.

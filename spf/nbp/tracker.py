@@ -19,7 +19,7 @@ from spf.filters.resampling import ResamplingSettings, resample
 from spf.filters.step import Clock, State, StepInfo
 from spf.hand.model import Hand
 from spf.kernels.cost import Spheres
-from spf.nbp.beliefs import BeliefSettings, Model, propagate, start_messages
+from spf.nbp.beliefs import BeliefSettings, Messages, Model, propagate
 from spf.nbp.bodies import QUATERNION, aligned, bodies_of, states_of
 from spf.nbp.graph import graph_of
 from spf.nbp.hands import draw_hands
@@ -71,7 +71,8 @@ def step(
     temporal = _temporal(hand, expected, predict(hand, expected, interval, settings, rng), state.reference, anchors)
     model = Model(bodies, graph_of(hand, bodies), observation, settings, temporal, anchors)
     clock("predict")
-    beliefs, messages = temporal, start_messages()
+    beliefs = temporal
+    messages: Messages = {}
     iterations = max(1, round(effort * settings.iterations))
     for _ in range(iterations):
         beliefs, messages = propagate(model, messages, beliefs, settings.n, rng)

@@ -8,7 +8,7 @@ import pytest
 from spf.hand.kinematics import joints_of
 from spf.hand.model import BONES
 from spf.locate import reach_of
-from spf.nbp.beliefs import Model, _structural, propagate, start_messages
+from spf.nbp.beliefs import Model, _structural, propagate
 from spf.nbp.bodies import PLACE, QUATERNION, bodies_of, states_of
 from spf.nbp.evidence import EvidenceSettings, hidden_by, log_evidence
 from spf.nbp.graph import graph_of
@@ -101,7 +101,7 @@ def test_iterations_refine_a_coarse_hand(scene, rng):
     wide = np.array([0.008] * 3 + [0.08] * 4)
     temporal = [own._replace(bandwidth=wide) for own in beliefs_at(states)]
     model = Model(bodies, graph_of(hand, bodies), observation, NbpSettings(), temporal, anchors)
-    beliefs, messages = temporal, start_messages()
+    beliefs, messages = temporal, {}
     for _ in range(4):
         beliefs, messages = propagate(model, messages, beliefs, 60, rng)
     assert len(messages) == 30
