@@ -217,7 +217,7 @@ def test_a_lane_is_told_by_its_tracker_preset_and_changes():
     lane = Lane("spf")
     lane.preset = "paper"
     lane.change("n", 8)
-    assert lane.title == "Smart Particle Filter · paper · n 8"
+    assert lane.title == "Smart Particle Filter · paper · N 8"
 
 
 def test_faster_clicks_than_frames_leave_the_lanes_together(compared):
