@@ -30,7 +30,7 @@ def test_a_live_sensor_is_tracked_recorded_and_opened(page):
         button(page, "Stop recording").click()
         button(page, "Open the recording").click()
         picture(page, "Depth image").wait_for()
-        page.get_by_text(path.stem).first.wait_for()
+        page.get_by_text(path.stem).filter(visible=True).first.wait_for()
         session = open_session(path)
         assert [note.text for note in session.notes] == ["thumb hidden"]
         assert (session.warnings, len(session) > 30) == ((), True)
