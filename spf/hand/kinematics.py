@@ -23,6 +23,7 @@ __all__ = [
     "pose_hand",
     "relative_to_camera",
     "rotation_about",
+    "rotations_about",
     "skin_jvp",
     "skin_vjp",
 ]
@@ -130,6 +131,16 @@ def rotation_about(angles: ArrayLike) -> Array:
     ry = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
     rz = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
     return rx @ ry @ rz
+
+
+def rotations_about(axis: int, angles: Array) -> Array:
+    """Return rotations (N, 3, 3) about a coordinate axis, for angles (N,) in radians."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turned = np.tile(np.eye(3), (len(angles), 1, 1))
+    turned[:, i, i] = turned[:, j, j] = np.cos(angles)
+    turned[:, j, i] = np.sin(angles)
+    turned[:, i, j] = -turned[:, j, i]
+    return turned
 
 
 def relative_to_camera(pose: Array, reference: Array) -> Array:

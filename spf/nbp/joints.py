@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from spf.hand.kinematics import rotations_about
 from spf.nbp.bodies import PLACE, QUATERNION, STATE, rotations_of
 from spf.nbp.graph import Joint
 
@@ -53,7 +54,7 @@ def angles_between(joint: Joint, parents: Array, children: Array) -> Array:
             remaining[:, i, i] + remaining[:, j, j],
         )
         angles[:, r] = turn / joint.gains[r]
-        remaining = _about(int(axis), -turn) @ remaining
+        remaining = rotations_about(int(axis), -turn) @ remaining
     return np.clip(angles, *joint.limits.T)
 
 
@@ -61,12 +62,5 @@ def _turns(joint: Joint, angles: Array) -> Array:
     """Rotations (M, 3, 3) of a joint."""
     turned = np.tile(np.eye(3), (len(angles), 1, 1))
     for axis, gain, angle in zip(joint.axes, joint.gains, angles.T, strict=True):
-        turned = turned @ _about(int(axis), gain * angle)
+        turned = turned @ rotations_about(int(axis), gain * angle)
     return turned
-
-
-def _about(axis: int, angles: Array) -> Array:
-    """Rotations (M, 3, 3) about a coordinate axis."""
-    vectors = np.zeros((len(angles), 3))
-    vectors[:, axis] = angles
-    return np.asarray(Rotation.from_rotvec(vectors).as_matrix())

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from spf.hand.kinematics import rotations_about
 from spf.kernels.samples import LARGEST_PICTURE, SampleScenes
 from spf.kernels.sensing import FAULTS
 from spf.learned.layout import CROP_SIZE, EXTENT_PER_LENGTH
@@ -18,7 +19,7 @@ from spf.synthetic.trajectory import PALM_TO_SENSOR
 from spf.training.articulations import draw_articulations
 from spf.training.shapes import ShapeTable
 
-__all__ = ["Scenes", "draw_scenes", "other_faces", "rotations_about"]
+__all__ = ["Scenes", "draw_scenes", "other_faces"]
 
 Array = NDArray[np.float64]
 
@@ -53,16 +54,6 @@ def other_faces(first: int) -> NDArray[np.int32]:
     return np.concatenate(
         [_TUBE.faces + counts[0], *(_BALL.faces + start for start in counts[1:-1])], dtype=np.int32, casting="unsafe"
     )
-
-
-def rotations_about(axis: int, angles: Array) -> Array:
-    """Return rotations (N, 3, 3) about a coordinate axis, for angles (N,) in radians."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    turned = np.tile(np.eye(3), (len(angles), 1, 1))
-    turned[:, i, i] = turned[:, j, j] = np.cos(angles)
-    turned[:, j, i] = np.sin(angles)
-    turned[:, i, j] = -turned[:, j, i]
-    return turned
 
 
 def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share: float) -> Scenes:
