@@ -98,11 +98,10 @@ class Live:
     def facts(self) -> LiveFacts:
         """How it stands now."""
         feed, lately = self._feed.state, list(self._lately)
-        doing = self._doing if feed.connected or feed.ended else "Connecting"
         span = lately[-1][0] - lately[0][0] if len(lately) > 1 else 0.0
         percentiles = np.percentile([latency for _, latency in lately], [50, 95]) * 1e3 if lately else None
         return LiveFacts(
-            "The source has ended" if feed.ended and not self._error else doing,
+            self._doing_now(feed),
             feed,
             self._feed.recording,
             (len(lately) - 1) / span if span > 0 else 0.0,
@@ -120,6 +119,13 @@ class Live:
             return self._picture
         taken = self._feed.newest(timeout=0.0)
         return None if taken is None else LivePicture(taken.index, taken.frame(), None)
+
+    def _doing_now(self, feed: FeedState) -> str:
+        if self._error or feed.failed:
+            return "Stopped"
+        if feed.ended:
+            return "The source has ended"
+        return self._doing if feed.connected else "Connecting"
 
     def record(self, path: Path) -> None:
         """Record every frame from the next one on; blocks until it is there.

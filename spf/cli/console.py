@@ -23,6 +23,7 @@ from spf.sessions import Session, open_session
 __all__ = [
     "INTERRUPTED",
     "check_output",
+    "check_session_output",
     "complain",
     "open_given",
     "parse_assignments",
@@ -162,3 +163,15 @@ def check_output(path: Path, force: bool) -> None:
         raise RunError(f"{path} exists already: choose another name, or replace it with --force.")
     if not path.resolve().parent.is_dir():
         raise RunError(f"There is no folder {path.resolve().parent} to write {path.name} to: make it first.")
+
+
+def check_session_output(path: Path, force: bool) -> None:
+    """Check that a session may be written to a file, before any work is done.
+
+    Raises:
+        SettingError: its name is not one of a session.
+        RunError: see :func:`check_output`.
+    """
+    if path.suffix.lower() != ".mcap":
+        raise SettingError(f"A session is written as an MCAP file: name it something like {path.with_suffix('.mcap')}.")
+    check_output(path, force)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from spf.cli.console import check_output, complain, warn
+from spf.cli.console import check_session_output, complain, warn
 from spf.cli.live_status import (
     STATUS_EVERY,
     checked_side,
@@ -76,9 +76,9 @@ def record(
 
         spf record replay:sessions/open-close.mcap -o tracked.mcap --track runs/live
     """
-    check_output(output, force)
     if run is not None and run.resolve() == output.resolve():
         raise SettingError("--track takes a directory, and --output a file: give them different names.")
+    check_session_output(output, force)
     if run is not None:
         request = Request("spf", "default", make_settings("spf", "default", {}), side=checked_side(side))
         track_live(uri, run, output, request, seconds=seconds, wait=wait, force=force, as_json=as_json)

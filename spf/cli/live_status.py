@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.status import Status
 
 from spf.cli.console import complain, warn
@@ -24,6 +25,7 @@ __all__ = [
     "STATUS_EVERY",
     "checked_side",
     "facts",
+    "in_words",
     "raise_if_ended",
     "status_line",
     "stopped_by_signals",
@@ -33,6 +35,23 @@ __all__ = [
 ]
 
 STATUS_EVERY = 0.5  # s
+_WORDS = {
+    "doing": "{}",
+    "sensor": "{}",
+    "frames": "{} frames",
+    "frames_per_second": "{:.0f}/s",
+    "latency_ms_median": "latency {} ms",
+    "latency_ms_p95": "95 % under {} ms",
+    "dropped": "{} dropped for newer ones",
+    "missing_from_sensor": "{} lost before this computer",
+    "reconnected": "connected again {}×",
+    "recorded": "recorded {} frames",
+    "recorded_s": "{:.1f} s",
+    "megabytes": "{:.1f} MB",
+    "queued": "{} still to write",
+    "not_recorded": "{} not recorded",
+    "notes_not_recorded": "{} markers and notes not kept",
+}
 _PATIENCE = 20.0  # s for a first frame where no time is given: longer than what sensors themselves wait for one
 
 
@@ -152,9 +171,15 @@ def status_line(as_json: bool) -> Iterator[Any]:
         yield lambda _values: None
         return
     with Status("Connecting", console=console) as status:
-        yield lambda values: status.update(
-            "  ".join(f"{name.replace('_', ' ')} {value}" for name, value in values.items() if value not in (None, 0))
-        )
+        yield lambda values: status.update(in_words(values))
+
+
+def in_words(values: dict[str, Any]) -> str:
+    """Return facts of a feed, its recording and its tracking as one line; what is not there or 0 is left out."""
+    words = [text.format(values[name]) for name, text in _WORDS.items() if values.get(name)]
+    if values.get("connected") is False:
+        words.insert(0, "not connected")
+    return escape(" · ".join(words))
 
 
 def take_notes(feed: Feed) -> None:

@@ -11,7 +11,7 @@ import typer
 
 from spf.cli.console import (
     INTERRUPTED,
-    check_output,
+    check_session_output,
     complain,
     open_given,
     parse_assignments,
@@ -113,7 +113,7 @@ def convert(
 
     Example:  spf convert recordings/P5 P5.mcap --frames 0:200
     """
-    check_output(output, force)
+    check_session_output(output, force)
     with open_given(session, camera) as opened:
         first, last = parse_range(frames, len(opened))
         _write(opened, output, first, last)
@@ -149,7 +149,7 @@ def split(
         bounds = [0, *_cuts(at, len(opened)), len(opened)]
         parts = [output.with_name(f"{output.stem}-{number}.mcap") for number in range(1, len(bounds))]
         for part in parts:
-            check_output(part, force)
+            check_session_output(part, force)
         for part, first, last in zip(parts, bounds[:-1], bounds[1:], strict=True):
             _write(opened, part, first, last)
             print(f"Wrote {last - first} frames to {part}.")
@@ -215,7 +215,7 @@ def synth(
 
     Example:  spf synth wave.mcap --motion wave --sensor kinect2 --frames 200 --seed 1 --set holes=0.05
     """
-    check_output(output, force)
+    check_session_output(output, force)
     named = {"motion": motion, "sensor": sensor, "clutter": clutter, "side": side, "shape": shape}
     settings = SyntheticSettings().replace(frames=frames, speed_mm=speed, seed=seed, **named)
     session = synthesise(settings.with_text(parse_assignments(assignments or [])))

@@ -79,6 +79,16 @@ def test_a_sensor_that_is_missing_is_told_and_waited_for():
         Live("leap:", REQUEST)
 
 
+def test_a_sensor_that_came_back_as_another_one_is_told_as_the_end(sample):
+    live = Live(f"replay:{sample}?loop=1", REQUEST)
+    wait_for(lambda: live.facts.feed.connected)
+    live._feed._update(message="The sensor came back with another image size.", failed=True, connected=False)
+    text = told(live.facts)
+    live.close()
+    assert "<b>Stopped</b>" in text
+    assert "another image size" in text
+
+
 def test_what_is_told():
     state = FeedState(None, False, "Unplugged. <Trying> again.", 100, 3, 0, 29.7, 2, False, False)
     recording = Recording(

@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,8 +19,9 @@ import pytest
 
 from benchmarks.kills import kill_once
 from spf.cli import execute, live_track
+from spf.cli.live_status import facts, in_words
 from spf.errors import SensorError
-from spf.live import recorder
+from spf.live import FeedState, Recording, recorder
 from spf.live.source import LiveSource
 from spf.sessions import open_session
 from tests.sessions.makers import make_mcap
@@ -47,6 +49,22 @@ def test_a_replay_is_recorded_to_its_end(made, tmp_path, capsys):
     assert execute(["record", f"replay:{made.path}", "-o", str(out), "--force", "--json"]) == 0
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert (last["recorded"], last["not_recorded"], last["complete"]) == (12, 0, True)
+
+
+def test_a_recording_is_named_as_what_it_is(made, tmp_path, capsys):
+    out = tmp_path / "r.csv"
+    assert execute(["record", f"replay:{made.path}", "-o", str(out)]) == 2
+    assert f"name it something like {tmp_path / 'r.mcap'}" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
+
+
+def test_how_it_stands_is_one_line_of_words():
+    state = FeedState(None, False, "", 120, 2, 0, 29.6, 1, False, False)
+    recording = Recording(Path("r.mcap"), 118, 0, 0, 0, 3.93, 2_540_000, 60.0, "", "")
+    assert in_words({"doing": "[b]tracking", **facts(state, recording)}) == (
+        "not connected · \\[b]tracking · 120 frames · 30/s · 2 lost before this computer · connected again 1× · "
+        "recorded 118 frames · 3.9 s · 2.5 MB"
+    )
 
 
 def test_it_stops_after_its_time(made, tmp_path, capsys):

@@ -53,7 +53,7 @@ def test_a_sensor_that_gives_no_frame_ends_the_command_with_its_time(tmp_path, c
     else:
         monkeypatch.setattr(network.NetworkSource, "warm_up", 0.0)
         monkeypatch.setattr(network, "_FIRST", 1e6)  # its own patience is not what ends it
-    assert execute([command, uri, "-o", str(tmp_path / "out"), "--seconds", "0.3"]) == 2
+    assert execute([command, uri, "-o", str(tmp_path / "out.mcap"), "--seconds", "0.3"]) == 2
     said = capsys.readouterr().err
     assert re.search(rf"No frame came from {uri} within 0\.3 s: (start 'spf stream|unplug the sensor)", said)
     assert list(tmp_path.iterdir()) == []
@@ -92,8 +92,9 @@ def test_a_sensor_that_comes_back_as_another_one_fails_the_command_and_keeps_wha
 
     monkeypatch.setattr(live_track, "find_live_start", find)
     use(monkeypatch, Exchanged())
-    file = tmp_path / "out" if command == "record" else tmp_path / "out" / "session.mcap"
-    to = ["--to", "tcp://127.0.0.1:*"] if command == "stream" else ["-o", str(tmp_path / "out")]
+    out = tmp_path / "out.mcap"
+    file = out if command == "record" else out / "session.mcap"
+    to = ["--to", "tcp://127.0.0.1:*"] if command == "stream" else ["-o", str(out)]
     assert execute([command, "realsense:", *to]) == 2
     said = capsys.readouterr()
     assert said.err.count("The sensor came back with another image size or camera: begin anew with it.") == 1
