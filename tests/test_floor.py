@@ -48,6 +48,18 @@ def test_a_hand_of_another_size_has_a_higher_floor(session):
     assert larger.descended.mean() > exact.descended.mean()
 
 
+def test_the_pull_keeps_digits_nearer_to_the_truth_than_a_free_descent_does(session):
+    indices = range(0, len(session), max(len(session) // 8, 1))
+    apart = {
+        pulled: [
+            floor_of(session.hand, session[i], np.random.default_rng(i), exact=True, pulled=pulled).descended.mean()
+            for i in indices
+        ]
+        for pulled in (True, False)
+    }
+    assert np.mean(apart[True]) < np.mean(apart[False])
+
+
 def test_a_frame_without_truth_or_without_anything_there_has_no_floor(session):
     frame, rng = session[0], np.random.default_rng(0)
     assert floor_of(session.hand, frame._replace(truth=None), rng) is None

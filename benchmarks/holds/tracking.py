@@ -87,13 +87,21 @@ def _floor_part(session: Session, frames: SessionFrames, start: Start) -> dict[s
     exact = session.hand if isinstance(session, SyntheticSession) else None
     lens = start.shape.lens
     labelled = hand_of_labels(session, lens)
-    part: dict[str, list[Any]] = {"fitted_mm": [], "floor_mm": [], "exact_floor_mm": [], "label_golden": []}
+    part: dict[str, list[Any]] = {
+        "fitted_mm": [],
+        "floor_mm": [],
+        "free_mm": [],
+        "exact_floor_mm": [],
+        "label_golden": [],
+    }
     for frame in frames[start.frame :]:
         rng = np.random.default_rng([frame.index, 7])
         own = floor_of(hand, frame, rng, lens=lens)
+        free = floor_of(hand, frame, rng, pulled=False, lens=lens)
         best = None if exact is None else floor_of(exact, frame, rng, exact=True)
         part["fitted_mm"].append(None if own is None else _mm(own.fitted))
         part["floor_mm"].append(None if own is None else _mm(own.descended))
+        part["free_mm"].append(None if free is None else _mm(free.descended))
         part["exact_floor_mm"].append(None if best is None else _mm(best.descended))
         part["label_golden"].append(
             None if frame.truth is None else round(label_energy(labelled, seen_through(frame, lens)), 4)

@@ -2,7 +2,8 @@
 
 Two parts of an error are not the tracker's search: the hand's shape and the data set's marks, which no pose removes (the hand
 *fitted* to the true joints), and what the cost prefers to the truth on noisy depth (the *descent* from there). The descent's
-digits are pulled to where it began, as a filter's are to the prediction: what is hidden stays where it is true.
+digits are pulled to where it began, as a filter's are to the prediction: what is hidden stays where it is true. Without the pull
+("free") nothing but the start is known: where such descents end farther off, the pull knows the truth as no filter does.
 """
 
 from __future__ import annotations
@@ -65,6 +66,7 @@ def floor_of(
     settings: SpfSettings | None = None,
     exact: bool = False,
     descents: int = 4,
+    pulled: bool = True,
     lens: float = 1.0,
 ) -> Floor | None:
     """Fit a hand to a frame's truth, and descend from there.
@@ -76,6 +78,7 @@ def floor_of(
         settings: of the cost and the descent; the default filter's when None.
         exact: begin at the exact pose of the truth, which must be one of this very hand, not at a fitted one.
         descents: SMD runs whose ends are averaged, as a filter's estimate averages its particles.
+        pulled: pull the digits to where they began; else the descent is free.
         lens: that the hand was found through (:mod:`spf.lens`); errors are as the stated camera shows them.
 
     Returns:
@@ -99,6 +102,8 @@ def floor_of(
     problem = make_problem(hand, observation, chosen, reference, rng)
     precision = chosen.points * chosen.prediction_pull / noise_scale(hand, chosen, _FRAME) ** 2
     precision[:6] = 0.0
+    if not pulled:
+        precision[:] = 0.0
     ends = [optimise(problem, chosen, rng, pose, prior=pose, precision=precision)[0] for _ in range(descents)]
     end = np.mean(ends, axis=0)
     fitted, descended = (_apart(joints_of(hand, p, reference) - truth.joints, lens) for p in (pose, end))
