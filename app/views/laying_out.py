@@ -12,7 +12,7 @@ __all__ = ["LayingOut"]
 
 
 class LayingOut(JSComponent):
-    """The line; it takes no room while there is nothing to say.
+    """The line, over what is below: it takes no room, so that nothing moves under a pointer when it goes.
 
     Args:
         on_shown: called when the browser shows the words.
@@ -49,7 +49,11 @@ class LayingOut(JSComponent):
 
     _stylesheets: ClassVar[list[str]] = [
         """
-        .laying-out { font: 14px/1.5 Roboto, sans-serif; margin: 8px 16px; color: var(--panel-on-background-color, #2a3038); }
+        :host { overflow: visible; position: relative; }
+        .laying-out {
+          position: absolute; top: 8px; left: 16px; margin: 0; white-space: nowrap;
+          font: 14px/1.5 Roboto, sans-serif; color: var(--panel-on-background-color, #2a3038);
+        }
         .laying-out[hidden] { display: none; }
         """
     ]

@@ -35,7 +35,7 @@ class Parts(Generic[P]):
         self._called, self._arrived, self._wanted = called, arrived, first
         self._made: dict[str, P] = {first: part}
         self._makers: dict[str, Callable[[], P]] = {}
-        self._line = LayingOut(self._arrive, margin=0)
+        self._line = LayingOut(self._arrive, width=0, height=0, margin=0)
         self.panel = pn.Column(self._line, part.panel, sizing_mode="stretch_width", margin=0)
 
     def offer(self, name: str, make: Callable[[], P]) -> None:

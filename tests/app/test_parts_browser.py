@@ -11,9 +11,12 @@ FIND = """const all = (root, wanted) => [...root.querySelectorAll('*')].flatMap(
     (it) => [...(it.matches(wanted) ? [it] : []), ...(it.shadowRoot ? all(it.shadowRoot, wanted) : [])]);"""
 #: Notes what each line that is laid out says while it is seen.
 WATCH = f"""() => {{ {FIND}
-  window.said = new Set();
+  window.said = new Set(), window.room = 0;
   const look = () => {{
-    for (const it of all(document, 'p.laying-out')) if (it.getClientRects().length) window.said.add(it.textContent);
+    for (const it of all(document, 'p.laying-out')) if (it.getClientRects().length) {{
+      window.said.add(it.textContent);
+      window.room = Math.max(window.room, it.getRootNode().host.getBoundingClientRect().height);
+    }}
   }};
   for (const it of all(document, 'p.laying-out')) new MutationObserver(look).observe(it, {{ attributes: true, childList: true }});
 }}"""
@@ -34,6 +37,7 @@ def test_a_part_that_is_laid_out_the_first_time_is_announced(page):
     for tab in ("3-D scene", "Mark joints"):
         page.get_by_role("button", name=tab, exact=True).filter(visible=True).click()
         said(page, f"Laying out “{tab}” …")
+    assert page.evaluate("window.room") == 0, "what is below moves when the line goes"
     page.evaluate("window.said.clear()")
     for tab, shown in (("Overview", "Reconstructed hand"), ("3-D scene", "Scene")):  # made already
         page.get_by_role("button", name=tab, exact=True).filter(visible=True).click()
