@@ -83,7 +83,7 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
 
 
 def _places(options: argparse.Namespace) -> list[_Place]:
-    """Deal the starts over kinds and recordings; a recording's frames are drawn among those that labels do not contradict."""
+    """Deal the starts over kinds and recordings; a recording's, among those whose compared frames no label contradicts."""
     groups = [*options.kinds, *options.recording]
     shares = [len(part) for part in np.array_split(np.arange(options.count), len(groups))]
     places: list[_Place] = []
@@ -104,7 +104,8 @@ def _in_recording(source: Source, count: int) -> list[_Place]:
     for index in rng.permutation(len(session) - max(_GIVEN)):
         if len(places) == count:
             break
-        if label_energy(hand, session[int(index)]) < CONTRADICTED:
+        compared = (session[int(index) + given - 1] for given in _GIVEN)
+        if all(label_energy(hand, frame) < CONTRADICTED for frame in compared):
             places.append(_Place(source, int(index)))
     return places
 

@@ -22,6 +22,7 @@ __all__ = [
     "log_density",
     "marginal_density",
     "paper_window",
+    "silverman_factor",
     "silverman_window",
 ]
 
@@ -137,12 +138,15 @@ def paper_window(samples: Array) -> float:
     return 1.06 * _spread(samples) * float(len(samples)) ** -0.2
 
 
+def silverman_factor(count: int, dimensions: int) -> float:
+    """``(4/((d+2) N))^(1/(d+4))``: windows by standard deviations of N samples in d dimensions (Silverman 1986)."""
+    return float((4.0 / ((dimensions + 2) * count)) ** (1.0 / (dimensions + 4)))
+
+
 def silverman_window(samples: Array) -> float:
-    """``(4/(d+2))^(1/(d+4)) σ N^(−1/(d+4))``, Silverman's rule in d dimensions."""
+    """Silverman's rule in d dimensions: :func:`silverman_factor` times σ of (30)."""
     count, dimensions = samples.shape
-    return float(
-        (4.0 / (dimensions + 2)) ** (1.0 / (dimensions + 4)) * _spread(samples) * count ** (-1.0 / (dimensions + 4))
-    )
+    return silverman_factor(count, dimensions) * _spread(samples)
 
 
 def adaptive_window(predicted: Array, optimised: Array) -> float:

@@ -90,8 +90,8 @@ def propagate(
         incoming = [model.temporal[body], *(m for (_, to), m in messages.items() if to == body)]
         drawn = sample_product(incoming, count, model.settings.sweeps, rng)
         states = aligned(drawn, model.anchors[body])
-        others = [other for other in range(len(before)) if other != body and not _joined(model.graph, body, other)]
-        weights = log_evidence(model.observation, model.bodies, body, states, model.settings, hidden, others)
+        hiding = model.graph.hiding[body]
+        weights = log_evidence(model.observation, model.bodies, body, states, model.settings, hidden, hiding)
         if model.settings.structural:
             weights += _structural(model, body, states, before)
         exponent = min(annealing_exponent(weights, model.settings.survival), 1.0)
@@ -102,10 +102,6 @@ def propagate(
         sent[down] = _message(model, joint, beliefs, messages.get(up), down, rng)
         sent[up] = _message(model, joint, beliefs, messages.get(down), up, rng)
     return beliefs, sent
-
-
-def _joined(graph: Graph, one: int, other: int) -> bool:
-    return any({one, other} == {joint.parent, joint.child} for joint in graph.joints)
 
 
 def _message(

@@ -8,6 +8,7 @@ with ν, the probability that no other body is in front, a pixel's factor is ``�
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import cv2
@@ -126,7 +127,7 @@ def log_evidence(
     states: Array,
     settings: EvidenceSettings,
     hidden: Hidden | None,
-    others: list[int],
+    hiding: Sequence[int],
 ) -> Array:
     """Logarithm (M,) of the likelihood (16) of states (M, 7) of a body.
 
@@ -137,7 +138,7 @@ def log_evidence(
         states: (M, 7).
         settings: of the likelihood.
         hidden: what is believed to be covered by whom; None to take all of it for visible.
-        others: bodies that may hide this one.
+        hiding: bodies that may hide this one.
     """
     arrays = observation.arrays
     seen = _seen(bodies, body, states, arrays.camera)
@@ -149,17 +150,17 @@ def log_evidence(
     ratios = np.where(labels == EMPTY, _EMPTY, ratios)
     ratios = np.where(labels == UNKNOWN, 1.0, ratios)
     if hidden is not None:
-        visible = _visible(observation, seen, hidden, others)
+        visible = _visible(observation, seen, hidden, list(hiding))
         ratios = visible * ratios + (1.0 - visible)
     share = settings.evidence / seen.facing.shape[1]
     return np.asarray(share * (np.log(ratios) * seen.facing).sum(axis=1))
 
 
-def _visible(observation: Observation, seen: _Seen, hidden: Hidden, others: list[int]) -> Array:
+def _visible(observation: Observation, seen: _Seen, hidden: Hidden, hiding: list[int]) -> Array:
     """ν (N, K): the probability that none of the other bodies hides a point."""
     grid = observation.arrays.grid_depth.shape
     cells, inside = seen.pixels(observation.arrays.grid_camera, grid)
-    shares = hidden.shares[others].reshape(len(others), -1)[:, cells]
-    depths = hidden.depths[others].reshape(len(others), -1)[:, cells]
+    shares = hidden.shares[hiding].reshape(len(hiding), -1)[:, cells]
+    depths = hidden.depths[hiding].reshape(len(hiding), -1)[:, cells]
     hides = shares * (depths < seen.depths - _FRONT)
     return np.where(inside, np.prod(1.0 - np.minimum(hides, 1.0), axis=0), 1.0)

@@ -52,10 +52,12 @@ class Graph(NamedTuple):
     Attributes:
         joints: E_K, parents first.
         apart: E_S.
+        hiding: (B,) for each body the others that may hide it: all but those joined to it.
     """
 
     joints: tuple[Joint, ...]
     apart: tuple[Apart, ...]
+    hiding: tuple[tuple[int, ...], ...]
 
 
 def graph_of(hand: Hand, bodies: Bodies) -> Graph:
@@ -73,7 +75,12 @@ def graph_of(hand: Hand, bodies: Bodies) -> Graph:
         parent = int(skeleton.parent[child])
         joints.append(Joint(parent, child, skeleton.rest[child], axes, gains, entries, hand.limits[entries]))
     apart = [Apart(one, other, _SOFT * float(bodies.radii[[one, other]].sum())) for one, other in _pairs()]
-    return Graph(tuple(joints), tuple(apart))
+    return Graph(tuple(joints), tuple(apart), tuple(_hiding(joints, body) for body in range(len(BONES))))
+
+
+def _hiding(joints: list[Joint], body: int) -> tuple[int, ...]:
+    near = {end for joint in joints for end in (joint.parent, joint.child) if body in (joint.parent, joint.child)}
+    return tuple(other for other in range(len(BONES)) if other not in near)
 
 
 def _pairs() -> list[tuple[int, int]]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from spf.filters.kde import silverman_factor
 from spf.filters.particles import log_sum_exp, normalise
 
 __all__ = ["Mixture", "draw_labels", "log_density", "mixture_of", "reweighed", "sample_product"]
@@ -38,11 +39,9 @@ class Mixture(NamedTuple):
 
 def mixture_of(samples: Array, log_weights: Array) -> Mixture:
     """Place kernels on weighted samples (M, d), as wide as the rule of thumb says (Silverman 1986), in each entry."""
-    count, dimensions = samples.shape
     weights = np.exp(log_weights)
     variance = weights @ (samples - weights @ samples) ** 2
-    factor = (4.0 / ((dimensions + 2) * count)) ** (1.0 / (dimensions + 4))
-    return Mixture(samples, log_weights, np.maximum(factor * np.sqrt(variance), _LEAST))
+    return Mixture(samples, log_weights, np.maximum(silverman_factor(*samples.shape) * np.sqrt(variance), _LEAST))
 
 
 def log_density(at: Array, mixture: Mixture) -> Array:

@@ -56,6 +56,14 @@ def test_shares_of_starts():
     assert "–" in starts._table(list(rows.values()))
 
 
+def test_no_start_is_compared_with_labels_that_contradict_the_depth(monkeypatch):
+    (source,) = synthetic("medium", 1, 1, 30)
+    monkeypatch.setattr(starts, "label_energy", lambda _hand, frame: 0.9 if frame.index in (3, 15) else 0.2)
+    compared = {place.frame + given - 1 for place in starts._in_recording(source, 30) for given in (1, 10)}
+    assert compared.isdisjoint({3, 15})
+    assert {2, 4, 14} < compared
+
+
 def test_shares_of_kidnaps():
     def one(noticed, recovered, *, again=False):
         return {"kind": "medium", "noticed": noticed, "recovered": recovered, "lost_again": again}
