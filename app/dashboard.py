@@ -110,7 +110,8 @@ def page() -> pmu.Page:
     live = LiveCard(state, controller.open, SAMPLES, kernels().wait)
     live.replaces(transport.panel, modes.panel)
     main = [
-        transport.panel, Messages(state).panel, live.view, modes.panel, tour, Names(width=0, height=0, margin=0),
+        transport.panel, Messages(state).panel, live.view, modes.panel, tour, modes.scroll,
+        Names(width=0, height=0, margin=0),
     ]  # fmt: skip
     line = {"margin": (2, 10)}
     sidebar = [

@@ -41,8 +41,11 @@ FAR = 200  # frame that the long run goes to
 GONE = 45.0  # s after which Bokeh has dropped the pages that were closed
 TROUBLE = re.compile(r"Traceback|\bERROR\b|Exception|exception")
 
-# One page's visitor: steps at a pace, from the end back to the start, and notes how long the page took to show each frame.
-_VISIT = """([pace]) => {
+# One page's visitor: steps at a pace of its own that wavers by half, as nobody's visitors step in time with each other, from
+# the end back to the start, and notes how long the page took to show each frame.
+_VISIT = """([pace, seed]) => {
+  let state = Math.imul(seed + 1, 2654435769) >>> 0;
+  const even = () => { state = (Math.imul(state, 1664525) + 1013904223) >>> 0; return state / 2 ** 32; };
   const all = (root) => [...root.querySelectorAll('*')].flatMap((e) => [e, ...(e.shadowRoot ? all(e.shadowRoot) : [])]);
   const button = (name) => all(document).find((e) => e.tagName === 'BUTTON' && e.title?.startsWith(name) && !e.disabled);
   const frame = () => all(document).find((e) => e.ariaLabel === 'Frame' && e.role === 'slider')?.ariaValueNow;
@@ -58,7 +61,7 @@ _VISIT = """([pace]) => {
       while (frame() === before && performance.now() - began < 30000) await nap(5);
       window.answers.push((performance.now() - began) / 1000);
       window.steps += 1;
-      await nap(Math.max(0, pace * 1000 - (performance.now() - began)));
+      await nap(Math.max(0, pace * 1000 * (0.5 + even()) - (performance.now() - began)));
     }
   })();
 }"""
@@ -167,8 +170,8 @@ def _of(answers: list[float]) -> dict[str, float]:
 def stepping(browser: Browser, server: Server, pages: int, minutes: float, pace: float) -> list[dict[str, float]]:
     """Have pages step at once; memory and answers of each minute, the first being the one of warming up."""
     opened = [_started(browser, server) for _ in range(pages)]
-    for page in opened:
-        page.evaluate(_VISIT, [pace])
+    for number, page in enumerate(opened):
+        page.evaluate(_VISIT, [pace, number])
     server.probe.longest()
     rows = []
     for minute in range(round(minutes)):
@@ -188,7 +191,7 @@ def visits(browser: Browser, server: Server, count: int) -> list[dict[str, float
     rows = []
     for number in range(1, count + 1):
         page = _started(browser, server)
-        page.evaluate(_VISIT, [0.0])
+        page.evaluate(_VISIT, [0.0, number])
         page.wait_for_function("() => window.steps >= 3")
         page.close()
         if number % 5 == 0:
@@ -214,7 +217,7 @@ def long_run(browser: Browser, server: Server, session: Path, pace: float) -> di
     began = time.monotonic()
     busy.get_by_role("button", name="Track to here", exact=True).click()
     busy.get_by_text(re.compile(rf"Tracking to frame {FAR}")).first.wait_for()
-    other.evaluate(_VISIT, [pace])
+    other.evaluate(_VISIT, [pace, 0])
     server.probe.longest()
     busy.get_by_text(re.compile(rf"tracked to {FAR}")).first.wait_for()
     took = time.monotonic() - began
@@ -268,7 +271,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file that the figures are written to")
     parser.add_argument("--pages", type=int, default=8, help="that step at once")
     parser.add_argument("--minutes", type=float, default=10, help="that they step")
-    parser.add_argument("--pace", type=float, default=4.0, help="seconds from one step of a page to its next")
+    parser.add_argument("--pace", type=float, default=4.0, help="mean seconds from one step of a page to its next")
     parser.add_argument("--visits", type=int, default=20, help="pages that are opened and closed")
     options = parser.parse_args()
     figures = measure(options)

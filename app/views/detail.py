@@ -15,6 +15,7 @@ from app.views.curves import ERROR, ESS, Curves
 from app.views.depth import Depth
 from app.views.fit import Fit
 from app.views.grid import card, cards
+from app.views.parts import Parts
 from app.views.plots import BEFORE, heading
 from app.views.scene_tab import SceneTab
 from app.views.scenes import PICTURES, SCENES
@@ -45,10 +46,10 @@ class Detail:
     def __init__(self, state: State, renderer: Renderer) -> None:
         self._state = state
         self._overview = Overview(state, renderer)
-        self._tabs: dict[str, Tab] = {"overview": self._overview}
-        self._makers: dict[str, Callable[[], Tab]] = {
-            "particles": lambda: Thinking(state, renderer), "scene": lambda: SceneTab(state, renderer),
-        }  # fmt: skip
+        called = {name: f"“{words}”" for words, name in TABS.items()}
+        self._tabs = Parts[Tab]("overview", self._overview, called, self._arrived)
+        self._tabs.offer("particles", lambda: Thinking(state, renderer))
+        self._tabs.offer("scene", lambda: SceneTab(state, renderer))
         switch = pmu.RadioButtonGroup.from_param(
             state.look.param.tab, name="", options=TABS, size="small", margin=(0, 8),
             sx={"& .MuiToggleButton-root": {"textTransform": "none", "padding": "3px 14px", "whiteSpace": "nowrap"}},
@@ -58,26 +59,24 @@ class Detail:
             switch, self._views, justify_content="space-between", align_items="center", sizing_mode="stretch_width",
             margin=(0, 8, 4, 0),
         )  # fmt: skip
-        self.panel = pn.Column(head, self._tabs["overview"].panel, sizing_mode="stretch_width", margin=0)
-        state.look.param.watch(self._follow, "tab")
+        self.panel = pn.Column(head, self._tabs.panel, sizing_mode="stretch_width", margin=0)
+        state.look.param.watch(lambda event: self._tabs.show(event.new), "tab")
 
     @property
     def pictures(self) -> ThreeD:
-        """The pictures of the tab that is seen; the first tab's where it has none."""
-        return self._tabs[self._state.look.tab].pictures or self._overview.pictures
+        """The pictures of the tab that is seen; the first tab's where it has none, or none yet."""
+        return self._seen.pictures or self._overview.pictures
+
+    @property
+    def _seen(self) -> Tab:
+        return self._tabs.get(self._state.look.tab) or self._overview
 
     def offer(self, tab: str, make: Callable[[], Tab]) -> None:
         """Say how a tab is made when it is first asked for."""
-        self._makers[tab] = make
+        self._tabs.offer(tab, make)
 
-    def _follow(self, *_events: Any) -> None:
-        tab = self._state.look.tab
-        if tab not in self._tabs:
-            self._tabs[tab] = self._makers[tab]()
-            self.panel.append(self._tabs[tab].panel)
-        for name, part in self._tabs.items():
-            part.panel.visible = name == tab
-        self._views.visible = self._tabs[tab].pictures is not None
+    def _arrived(self) -> None:
+        self._views.visible = self._seen.pictures is not None
         self.pictures.request()
 
 

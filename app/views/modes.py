@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-import panel as pn
 import panel_material_ui as pmu
 
 from app.state import MODES, State
 from app.views.comparison import Comparison
 from app.views.detail import Detail
 from app.views.help import Help
+from app.views.parts import Parts
+from app.views.scroll import Scroll
 from app.views.three_d import ThreeD
 from spf.render import Renderer
 
 __all__ = ["Modes"]
 
 
-_A_MOMENT = 0.1  # s in which the browser says what it is about to do, for it then is busy
-_LAYING_OUT = {"compare": "Laying out the comparison", "help": "Opening the help"}
+_CALLED = {"compare": "the comparison", "help": "the help"}
 _SWITCH = {
     "& .MuiToggleButton-root": {
         "color": "white", "borderColor": "rgba(255, 255, 255, 0.5)", "padding": "3px 12px", "whiteSpace": "nowrap",
@@ -35,10 +34,13 @@ class Modes:
     """The switch in the page's head, and the part below."""
 
     def __init__(self, state: State, renderer: Renderer) -> None:
-        self._state, self._renderer = state, renderer
+        self._state = state
         self.detail = Detail(state, renderer)
-        self._parts: dict[str, Detail | Comparison | Help] = {"one": self.detail}
-        self.panel = pn.Column(self.detail.panel, sizing_mode="stretch_width", margin=0)
+        self._parts = Parts[Detail | Comparison | Help]("one", self.detail, _CALLED, self._arrived)
+        self._parts.offer("compare", lambda: Comparison(state, renderer))
+        self._parts.offer("help", lambda: Help(state, renderer))
+        self.scroll = Scroll(place=state.mode, width=0, height=0, margin=0)
+        self.panel = self._parts.panel
         state.param.watch(self._follow, "mode")
 
     def switch(self, show: Callable[[str], Awaitable[None]]) -> pmu.RadioButtonGroup:
@@ -52,13 +54,8 @@ class Modes:
         )
 
         async def picked(event: Any) -> None:
-            if event.new == self._state.mode:
-                return
-            if event.new not in self._parts:
-                self._state.preparing = _LAYING_OUT[event.new]
-                await asyncio.sleep(_A_MOMENT)
-            await show(event.new)
-            self._state.preparing = ""
+            if event.new != self._state.mode:
+                await show(event.new)
 
         group.param.watch(picked, "value")
         self._state.param.watch(lambda event: setattr(group, "value", event.new), "mode")
@@ -66,19 +63,16 @@ class Modes:
 
     @property
     def pictures(self) -> ThreeD:
-        """The pictures that are seen."""
-        return self._parts[self._state.mode].pictures
+        """The pictures that are seen; those of one tracker while others are laid out."""
+        return (self._parts.get(self._state.mode) or self.detail).pictures
 
     async def drawn(self) -> None:
         """Wait until the browser shows the latest frame."""
         await self.pictures.drawn()
 
-    def _follow(self, *_events: Any) -> None:
-        mode = self._state.mode
-        if mode not in self._parts:
-            made = Comparison if mode == "compare" else Help
-            self._parts[mode] = made(self._state, self._renderer)
-            self.panel.append(self._parts[mode].panel)
-        for name, part in self._parts.items():
-            part.panel.visible = name == mode
+    def _follow(self, event: Any) -> None:
+        self.scroll.place = event.new  # first, while the part that is left is still in its place
+        self._parts.show(event.new)
+
+    def _arrived(self) -> None:
         self.pictures.request()

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import panel as pn
+from bokeh.models.widgets.tables import NumberFormatter
 
 from app.state import State
 from app.views.follower import Follower
@@ -40,10 +41,10 @@ class ParticleTable(Follower):
         self._particles = particles
         self.pane = pn.widgets.Tabulator(
             _frame(particles), show_index=False, disabled=True, selectable=True, layout="fit_data_stretch",
-            theme="simple", stylesheets=[_SMALL], sizing_mode="stretch_both", margin=0,
+            theme="simple", stylesheets=[_SMALL], sizing_mode="stretch_both", margin=0, pagination=None,  # it scrolls
             widths={heading: width for heading, _, width in _COLUMNS.values()},
             formatters={
-                heading: {"type": "money", "precision": decimals, "thousand": False, "symbol": ""}
+                heading: NumberFormatter(format=f"{0:.{decimals}f}", nan_format="–", text_align="right")
                 for heading, decimals, _ in _COLUMNS.values()
                 if decimals is not None
             },
@@ -65,7 +66,7 @@ class ParticleTable(Follower):
 
 
 def _frame(particles: Particles) -> pd.DataFrame:
-    """The columns of the source that are shown; a number that does not exist is empty."""
+    """The columns of the source that are shown; a number that does not exist is a dash."""
     data = particles.source.data
     frame = pd.DataFrame({heading: data[name] for name, (heading, _, _) in _COLUMNS.items()})
     return frame.replace([np.inf, -np.inf], np.nan)

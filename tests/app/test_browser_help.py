@@ -23,7 +23,7 @@ __all__ = ["page"]
 
 def serious(page):
     """What axe-core finds wrong and calls serious or critical: rule and elements."""
-    found = Axe().run(page).response["violations"]
+    found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
     return {
         finding["id"]: [node["html"][:160] for node in finding["nodes"]]
         for finding in found

@@ -73,6 +73,19 @@ def test_a_particle_picked_in_the_table_is_picked_everywhere(tracked):
     assert table.pane.selection == [0, 2]
 
 
+def test_a_table_of_hundreds_scrolls_and_has_dashes_for_what_there_is_not(page, sample, act):
+    state, controller = page
+    state.lane.tracker = "condensation"
+    act(lambda: controller.open(sample), controller.start, controller.step)
+    particles = Particles(state)
+    table = ParticleTable(state, particles)
+    particles.draw()
+    table.draw()
+    assert (len(table.pane.value), table.pane.pagination) == (500, None)
+    assert np.isnan(table.pane.value["E after"]).all()
+    assert table.pane.formatters["E after"].nan_format == "–"
+
+
 def test_the_table_says_where_particles_come_from_and_what_they_weigh(tracked):
     particles = Particles(tracked)
     table = ParticleTable(tracked, particles)
