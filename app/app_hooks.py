@@ -1,20 +1,26 @@
 """What a server does before the first page is asked for: compile the kernels, start the renderer, keep order."""
 
 import asyncio
+import gc
 from typing import Any
 
 from tornado.ioloop import IOLoop
 from tornado.websocket import WebSocketClosedError
 
+import app.dashboard  # noqa: F401 - before the first visitor waits for it
 from app.sending import keep_order
 from app.server import kernels, renderer
 
 
 def on_server_loaded(_server_context: Any) -> None:
-    """Begin the first two in the background."""
+    """Begin the first two in the background.
+
+    What has been imported by now stays: a look for garbage, during which nobody is answered, need not go through it.
+    """
     keep_order()
     kernels()
     renderer()
+    gc.freeze()
     IOLoop.current().asyncio_loop.set_exception_handler(_tell)  # type: ignore[attr-defined]
 
 

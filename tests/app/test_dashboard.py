@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import subprocess
+import sys
 
 import panel as pn
 from bokeh.document import Document
@@ -22,3 +24,17 @@ def test_the_server_holds_no_page():
     before = followers()
     asyncio.run(made())
     assert followers() == before
+
+
+def test_a_server_that_is_loaded_has_all_that_stays_out_of_the_way_of_its_garbage():
+    program = (
+        "import asyncio, gc, sys\n"
+        "from app import app_hooks\n"
+        "async def load():\n"
+        "    app_hooks.kernels = app_hooks.renderer = lambda: None\n"
+        "    app_hooks.on_server_loaded(None)\n"
+        "asyncio.run(load())\n"
+        "print('app.views.modes' in sys.modules, gc.get_freeze_count() > 100_000)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True).stdout
+    assert said.split() == ["True", "True"]
