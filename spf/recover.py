@@ -16,7 +16,7 @@ from spf.learned.network import Network
 from spf.locate import Seeds, around, locate, polished, reach_of, strangeness, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings
-from spf.segmentation import find_plane, find_regions
+from spf.segmentation import find_regions
 
 __all__ = ["glance", "recover"]
 
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
 _REGIONS = 2  # of the frame, the nearest, that are looked at
 _SEEN = 0.3  # presence of a hand, in the network's eyes, from which it is looked for in a place
+_FAMILIAR = 0.1  # golden energy that a pose which is what the network sees is charged at most for being strange
 _JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose
 
 
@@ -31,6 +32,7 @@ def recover(
     frame: Frame,
     hand: Hand,
     limit: float,
+    better: float,
     last: Array,
     within: float,
     missing: int,
@@ -43,6 +45,7 @@ def recover(
         frame: the depth image.
         hand: the calibrated hand.
         limit: golden energy under which a pose is believed; one that is held otherwise than it was needs a lower one.
+        better: the same of a pose that is what the network sees there, for which it is enough to be better than the last.
         last: (D,) the pose that it was lost in, relative to the camera's axes.
         within: m that its palm can have moved since.
         missing: frames since it was lost: the longer, the less counts how it was held.
@@ -57,24 +60,21 @@ def recover(
 
     def believed(found: list[tuple[float, Array, float]]) -> Array | None:
         near = [(energy, pose) for _, pose, energy in found if np.linalg.norm(pose[:3] - last[:3]) < within]
-        rated = [
-            (
-                energy
-                + remembered * _unlikely(pose, last, within)
-                + strangeness(network, frame, hand, pose, np.eye(3)),
-                pose,
-            )
-            for energy, pose in near
-        ]
-        best = min(rated, key=lambda item: item[0], default=None)
-        return best[1] if best is not None and best[0] < limit else None
+        rated = []
+        for energy, pose in near:
+            charge = strangeness(network, frame, hand, pose, np.eye(3))
+            believable = max(limit, better) if network is not None and charge < _FAMILIAR else limit
+            charged = energy + remembered * _unlikely(pose, last, within) + charge
+            if charged < believable:
+                rated.append((charged, pose))
+        return min(rated, key=lambda item: item[0])[1] if rated else None
 
     near = observe(frame, last[:3], reach_of(hand))
     if not near.is_empty:
         pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
         if pose is not None:
             return pose
-    for place in _places(network, frame, hand, last, rng):
+    for place in _places(network, frame, hand, last):
         pose = believed(locate(hand, place.observation, place.points, settings, rng, place.seeds))
         if pose is not None:
             return pose
@@ -96,7 +96,7 @@ def glance(
         best, or None when there is none.
     """
     best: tuple[float, Array] | None = None
-    for place in _places(network, frame, hand, last, rng):
+    for place in _places(network, frame, hand, last):
         assert place.seeds is not None
         for _, pose, energy in polished(hand, place.observation, place.seeds.poses, rng):
             if np.linalg.norm(pose[:3] - last[:3]) > within:
@@ -121,24 +121,21 @@ class _Place(NamedTuple):
     seeds: Seeds | None
 
 
-def _places(
-    network: Network | None, frame: Frame, hand: Hand, last: Array, rng: np.random.Generator
-) -> Iterator[_Place]:
+def _places(network: Network | None, frame: Frame, hand: Hand, last: Array) -> Iterator[_Place]:
     """Go over the places where the network sees a hand, the nearest to the last one first; without it, over whole regions.
 
     What is seen is cut out around the place, as it is for the tracker: so golden energies compare with the tracker's.
     """
-    plane = find_plane(frame, rng)
-    regions = find_regions(frame, plane)
+    regions = find_regions(frame)
     size = hand.length / load_hand(hand.side).length
     for region in regions[:_REGIONS]:
         if network is None:
-            looked = observe(frame, region.centre, region.radius, plane=plane)
+            looked = observe(frame, region.centre, region.radius)
             if not looked.is_empty:
                 yield _Place(looked, region.points, None)
             continue
         seen = [s for s in suggested(network, frame, region, (hand.side,), size)[hand.side] if s.presence > _SEEN]
         for seeds in sorted(seen, key=lambda seeds: float(np.linalg.norm(seeds.poses[0, :3] - last[:3]))):
-            looked = observe(frame, seeds.poses[0, :3], reach_of(hand), plane=plane)
+            looked = observe(frame, seeds.poses[0, :3], reach_of(hand))
             if not looked.is_empty:
                 yield _Place(looked, region.points, seeds)

@@ -37,8 +37,9 @@ _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
 _FIRST_EFFORT = 3.0
 _FRAME = 1.0 / 30.0  # s
+_SEEN = 0.3  # presence of a hand where it is tracked, in the network's eyes, under which a frame is bad
 _STRANGE = 0.3  # golden energy that an estimate is charged by the network, over which it is doubted
-_CLEARLY = 0.05  # golden energy that a hand elsewhere must be better by than a doubted one
+_CLEARLY = 0.05  # golden energy that a hand elsewhere must be better by than a doubted one, or where a lost one was
 _NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a hand is looked for in, and how much it grows a frame
 
 
@@ -73,7 +74,7 @@ class TrackState(NamedTuple):
         history: recent golden energies of good frames.
         bad: bad frames in a row.
         fresh: whether the pose was just found and no frame has refined it.
-        golden: golden energy of the last estimate; 1 when there is none.
+        golden: golden energy of the last estimate, and what it is charged for being strange; 1 when there is none.
         missing: frames since the hand was lost.
         doubts: frames in a row in which the estimate may be on something else than the hand.
     """
@@ -168,16 +169,15 @@ def track_frame(
     if looked.observation.is_empty:
         state = state._replace(lost=True, missing=state.missing + 1)
         return state, _lost(tracking, state, frame, began)
-    new, info = _stepped(tracking, state, looked.observation, rng, record)
+    new, info = _stepped(tracking, state, looked, rng, record)
     doubts = _doubts(tracking, state, new, info, looked.seen)
-    observation = looked.observation
     # A glance takes several frames' time: it is taken at the first doubt in a row, the second, the fourth, …
     if doubts and doubts & (doubts - 1) == 0:
         elsewhere = _glanced(tracking, state, new, info, looked.seen, frame, rng)
         if elsewhere is not None:
             state, doubts = elsewhere, 0
-            observation = _look(tracking, state, frame).observation
-            new, info = _stepped(tracking, state, observation, rng, record)
+            looked = _look(tracking, state, frame)
+            new, info = _stepped(tracking, state, looked, rng, record)
     new = new._replace(doubts=doubts)
     joints = stated_joints(tracking, info.estimate, info.reference)
     timings = {
@@ -189,7 +189,7 @@ def track_frame(
     result = TrackedFrame(
         frame.index, frame.time, info.estimate, info.reference, joints, new.lost, was_lost and not new.lost,
         info.estimate_log_likelihood, info.ess, info.estimate_golden, info.estimate_overlap, seconds, timings,
-        info, observation, state.filter.estimate[:3],
+        info, looked.observation, state.filter.estimate[:3],
     )  # fmt: skip
     return new, result
 
@@ -225,13 +225,13 @@ def _seen(tracking: Tracking, state: TrackState, frame: Frame) -> list[Guess]:
 
 
 def _stepped(
-    tracking: Tracking, state: TrackState, observation: Observation, rng: np.random.Generator, record: bool
+    tracking: Tracking, state: TrackState, looked: _Looked, rng: np.random.Generator, record: bool
 ) -> tuple[TrackState, StepInfo]:
     filter_state, info = TRACKERS[tracking.tracker].step(
-        rng, state.filter, observation, tracking.hand, tracking.settings,
+        rng, state.filter, looked.observation, tracking.hand, tracking.settings,
         spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
     )  # fmt: skip
-    return _judged(tracking, state, filter_state, info), info
+    return _judged(tracking, state, filter_state, info, looked.seen), info
 
 
 def _strange(tracking: Tracking, info: StepInfo, seen: list[Guess]) -> float:
@@ -267,7 +267,8 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     limit = min(_believable(state, tracking), 0.8 * state.golden)
     within = _NEAR + _STRIDE * state.missing
     last = relative_to_camera(state.filter.estimate, state.filter.reference)
-    found = recover(frame, tracking.hand, limit, last, within, state.missing, tracking.network, rng)
+    better = state.golden - _CLEARLY
+    found = recover(frame, tracking.hand, limit, better, last, within, state.missing, tracking.network, rng)
     if found is None:
         return state
     fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
@@ -284,16 +285,20 @@ def _believable(state: TrackState, tracking: Tracking) -> float:
     return max(1.3 * _usual(state, tracking) + 0.06, 0.3)
 
 
-def _judged(tracking: Tracking, state: TrackState, filter_state: State, info: StepInfo) -> TrackState:
-    """Notice a loss, frames in a row that the estimate's render explains much worse than usual, and its end."""
+def _judged(
+    tracking: Tracking, state: TrackState, filter_state: State, info: StepInfo, seen: list[Guess]
+) -> TrackState:
+    """Notice a loss, and its end: frames in a row that the estimate's render explains much worse than usual, or in which the
+    network sees no hand there, for an elbow can be rendered as well as a hand."""
     golden = info.estimate_golden
-    bad = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
-    poor = golden > _believable(state, tracking)
+    absent = bool(seen) and max(guess.presence for guess in seen) < _SEEN
+    bad = absent or golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
+    poor = absent or golden > _believable(state, tracking)
     count = state.bad + 1 if bad else 0
     history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
     lost = poor if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
-    return TrackState(filter_state, lost, history, count, False, golden, missing, state.doubts)
+    return TrackState(filter_state, lost, history, count, False, _strange(tracking, info, seen), missing, state.doubts)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:

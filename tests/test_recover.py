@@ -9,7 +9,7 @@ from spf.hand.kinematics import joints_of, pose_hand
 from spf.hand.model import load_hand
 from spf.learned.guesses import Guess, extent_of, guesses
 from spf.learned.network import available_network
-from spf.locate import _ABSENT, _AROUND, _LOOKS, _looks, strangeness_to
+from spf.locate import _ABSENT, _AROUND, _LOOKS, _looks, seen_at, strangeness_to
 from spf.prepare import prepare
 from spf.synthetic import synthesise
 from spf.synthetic.clutter import _forearm_mesh
@@ -78,3 +78,27 @@ def test_the_network_sees_hands_and_no_elbows():
     assert len(at_elbow) > 2
     assert np.median(at_hand) > 0.9
     assert np.median(at_elbow) < 0.3
+
+
+@needs_network
+def test_a_hand_is_lost_where_the_network_sees_none_however_well_it_is_rendered(monkeypatch):
+    def blind(*arguments):
+        return [guess._replace(presence=0.1) for guess in seen_at(*arguments)]
+
+    session = synthesise(session_settings("slow", 0, 4))
+    start = prepare(session, init="truth", seed=0)
+
+    def run():
+        tracking, state = begin("spf", make_settings("spf"), start, 0, time=float(session.times[0]))
+        results = []
+        for frame in session:
+            state, result = track_frame(tracking, state, frame)
+            results.append(result)
+        return [result.lost for result in results], max(result.golden for result in results)
+
+    assert run()[0] == [False] * 4
+    monkeypatch.setattr("spf.track.seen_at", blind)
+    monkeypatch.setattr("spf.locate.seen_at", blind)
+    lost, golden = run()
+    assert lost == [False, False, True, True]
+    assert golden < 0.3
