@@ -196,7 +196,8 @@ def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, 
     """Golden energy that a pose (D,) is charged for not being what the network sees where its hand is; 0 without it.
 
     By the network's density of the pose's joints, ``max Σ log p(x)/J`` over its hypotheses, lengths in the hand's, and by
-    whether it sees a hand there at all. A render that fits does not tell a fist from an elbow; what is around it does.
+    whether it sees a hand of that side there at all. A render that fits does not tell a fist from an elbow; what is around it
+    does.
     """
     if network is None:
         return 0.0
@@ -240,7 +241,7 @@ def strangeness_to(seen: Sequence[Guess], hand: Hand, joints: Array) -> float:
         per_joint = -apart / spread - 3.0 * np.log(spread / hand.length)
         return float(per_joint.mean()) + guess.log_weight / len(joints)
 
-    absent = 1.0 - max(guess.presence for guess in seen)
+    absent = 1.0 - float(np.exp([guess.log_weight for guess in seen]).sum())
     return _STRANGE * max(_FAMILIAR - max(log_density(guess) for guess in seen), 0.0) + _ABSENT * absent
 
 

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spf.frame import Frame
-from spf.hand.kinematics import rotation_about
+from spf.hand.kinematics import joints_of, rotation_about
 from spf.hand.model import Hand, load_hand
 from spf.learned.network import Network
-from spf.locate import Seeds, around, locate, polished, reach_of, strangeness, suggested
+from spf.locate import Seeds, around, locate, polished, reach_of, seen_at, strangeness_to, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings
 from spf.segmentation import find_regions
 
-__all__ = ["glance", "recover"]
+__all__ = ["glance", "recover", "unlikely"]
 
 Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
@@ -62,9 +62,9 @@ def recover(
         near = [(energy, pose) for _, pose, energy in found if np.linalg.norm(pose[:3] - last[:3]) < within]
         rated = []
         for energy, pose in near:
-            charge = strangeness(network, frame, hand, pose, np.eye(3))
+            charge = _strange(network, frame, hand, pose)
             believable = max(limit, better) if network is not None and charge < _FAMILIAR else limit
-            charged = energy + remembered * _unlikely(pose, last, within) + charge
+            charged = energy + remembered * unlikely(pose, last, within) + charge
             if charged < believable:
                 rated.append((charged, pose))
         return min(rated, key=lambda item: item[0])[1] if rated else None
@@ -101,16 +101,24 @@ def glance(
         for _, pose, energy in polished(hand, place.observation, place.seeds.poses, rng):
             if np.linalg.norm(pose[:3] - last[:3]) > within:
                 continue
-            charged = energy + _unlikely(pose, last, within) + strangeness(network, frame, hand, pose, np.eye(3))
+            charged = energy + unlikely(pose, last, within) + _strange(network, frame, hand, pose)
             if best is None or charged < best[0]:
                 best = charged, pose
     return best
 
 
-def _unlikely(pose: Array, last: Array, within: float) -> float:
+def unlikely(pose: Array, last: Array, within: float) -> float:
     """What a pose is charged for being elsewhere, and held otherwise, than the last one (D,); both by the camera's axes."""
     turn = Rotation.from_matrix(rotation_about(pose[3:6]) @ rotation_about(last[3:6]).T).magnitude()
     return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi)
+
+
+def _strange(network: Network | None, frame: Frame, hand: Hand, pose: Array) -> float:
+    """What a pose relative to the camera's axes is charged for not being what the network sees: a hand so held, of this side."""
+    if network is None:
+        return 0.0
+    seen = seen_at(network, frame, hand, pose, np.eye(3), ("right", "left"))
+    return strangeness_to([guess for guess in seen if guess.side == hand.side], hand, joints_of(hand, pose))
 
 
 class _Place(NamedTuple):

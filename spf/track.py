@@ -26,7 +26,7 @@ from spf.lens import as_stated, seen_through
 from spf.locate import reach_of, seen_at, strangeness_to
 from spf.observation import Observation, Suggestion, observe
 from spf.parallel import map_threads
-from spf.recover import glance, recover
+from spf.recover import glance, recover, unlikely
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
@@ -76,6 +76,7 @@ class TrackState(NamedTuple):
         fresh: whether the pose was just found and no frame has refined it.
         golden: golden energy of the last estimate, and what it is charged for being strange; 1 when there is none.
         missing: frames since the hand was lost.
+        held: (D,) the last estimate before those bad frames, relative to the camera's axes: where a hand is looked for.
         doubts: frames in a row in which the estimate may be on something else than the hand.
     """
 
@@ -86,6 +87,7 @@ class TrackState(NamedTuple):
     fresh: bool
     golden: float
     missing: int
+    held: Array
     doubts: int = 0
 
 
@@ -140,7 +142,7 @@ def begin(
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
     state = start_at(tracking.hand, pose, reference, time_, count)
-    return TrackState(state, False, (), 0, True, 1.0, 0)
+    return TrackState(state, False, (), 0, True, 1.0, 0, relative_to_camera(pose, reference))
 
 
 def track_frame(
@@ -255,24 +257,31 @@ def _glanced(
 ) -> TrackState | None:  # fmt: skip
     """Look elsewhere when the estimate is doubted; a state that begins there, when a hand explains clearly more there."""
     assert tracking.network is not None
-    last = relative_to_camera(state.filter.estimate, state.filter.reference)
-    found = glance(frame, tracking.hand, last, _NEAR + _STRIDE, tracking.network, rng)
-    if found is None or found[0] > _strange(tracking, info, seen) - _CLEARLY:
+    within = _within(new)
+    found = glance(frame, tracking.hand, state.held, within, tracking.network, rng)
+    here = relative_to_camera(info.estimate, info.reference)
+    if found is None or found[0] > _strange(tracking, info, seen) + unlikely(here, state.held, within) - _CLEARLY:
         return None
-    return _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)._replace(history=new.history)
+    fresh = _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)
+    return fresh._replace(history=new.history, held=state.held)
 
 
 def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.Generator) -> TrackState:
     """Search for a lost hand; the state goes on from where it was when nothing better is found."""
     limit = min(_believable(state, tracking), 0.8 * state.golden)
-    within = _NEAR + _STRIDE * state.missing
-    last = relative_to_camera(state.filter.estimate, state.filter.reference)
-    better = state.golden - _CLEARLY
-    found = recover(frame, tracking.hand, limit, better, last, within, state.missing, tracking.network, rng)
+    within = _within(state)
+    here = relative_to_camera(state.filter.estimate, state.filter.reference)
+    better = state.golden + unlikely(here, state.held, within) - _CLEARLY
+    found = recover(frame, tracking.hand, limit, better, state.held, within, state.missing, tracking.network, rng)
     if found is None:
         return state
     fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
-    return fresh._replace(history=state.history, lost=True)
+    return fresh._replace(history=state.history, lost=True, bad=state.bad, missing=state.missing, held=state.held)
+
+
+def _within(state: TrackState) -> float:
+    """Metres that a hand can be away from where it was held: the more, the longer that is ago."""
+    return _NEAR + _STRIDE * max(state.bad, state.missing, 1)
 
 
 def _usual(state: TrackState, tracking: Tracking) -> float:
@@ -298,7 +307,9 @@ def _judged(
     history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
     lost = poor if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
-    return TrackState(filter_state, lost, history, count, False, _strange(tracking, info, seen), missing, state.doubts)
+    held = state.held if bad or lost else relative_to_camera(filter_state.estimate, filter_state.reference)
+    charged = _strange(tracking, info, seen)
+    return TrackState(filter_state, lost, history, count, False, charged, missing, held, state.doubts)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:
