@@ -25,6 +25,7 @@ from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
 from spf.segmentation import Region
 
 __all__ = [
+    "FAMILIAR",
     "Seeds",
     "around",
     "locate",
@@ -38,6 +39,10 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+
+#: Golden energy that a pose is charged at most for being strange which is just what the network sees.
+FAMILIAR = 0.1
+
 _POLISHED, _GLANCED = 10, 4  # hypotheses that SMD is run from, in a search and in a glance
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
 _LOOKS, _AROUND = 7, 0.07  # places of a region that the network looks at, and m around each that it stands for

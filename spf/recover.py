@@ -13,7 +13,7 @@ from spf.frame import Frame
 from spf.hand.kinematics import joints_of, rotation_about
 from spf.hand.model import Hand, load_hand
 from spf.learned.network import Network
-from spf.locate import Seeds, around, locate, polished, reach_of, seen_at, strangeness_to, suggested
+from spf.locate import FAMILIAR, Seeds, around, locate, polished, reach_of, seen_at, strangeness_to, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings
 from spf.segmentation import find_regions
@@ -24,7 +24,6 @@ Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
 _REGIONS = 2  # of the frame, the nearest, that are looked at
 _SEEN = 0.3  # presence of a hand, in the network's eyes, from which it is looked for in a place
-_FAMILIAR = 0.1  # golden energy that a pose which is what the network sees is charged at most for being strange
 _JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose
 
 
@@ -63,7 +62,7 @@ def recover(
         rated = []
         for energy, pose in near:
             charge = _strange(network, frame, hand, pose)
-            believable = max(limit, better) if network is not None and charge < _FAMILIAR else limit
+            believable = max(limit, better) if network is not None and charge < FAMILIAR else limit
             charged = energy + remembered * unlikely(pose, last, within) + charge
             if charged < believable:
                 rated.append((charged, pose))

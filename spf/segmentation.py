@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Frame
+from spf.kernels.surface import count_by_planes
 
 __all__ = ["Region", "find_plane", "find_regions"]
 
@@ -118,20 +119,19 @@ def find_plane(frame: Frame) -> Array | None:
     points = camera.back_project(u, v, depth[v, u])
     a, b, c = points[np.random.default_rng(0).integers(len(points), size=(3, _PLANE_TRIALS))]
     normals = np.cross(b - a, c - a)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.maximum(lengths, 1e-12)
-    height = points @ normals.T - (a * normals).sum(axis=1)
-    behind = height * np.where(normals[:, 2] > 0.0, -1.0, 1.0) < -_BEHIND
-    inside = np.where(
-        (lengths[:, 0] > 1e-6) & (behind.mean(axis=0) < _MOST_BEHIND), (np.abs(height) < _ON_PLANE).sum(axis=0), 0
-    )
-    best = int(np.argmax(inside))
+    lengths = np.linalg.norm(normals, axis=1)
+    normals *= (np.where(normals[:, 2] > 0.0, -1.0, 1.0) / np.maximum(lengths, 1e-12))[:, None]
+    planes = np.column_stack([normals, -(a * normals).sum(axis=1)])
+    counts = np.empty((_PLANE_TRIALS, 2))
+    count_by_planes(points, planes, _ON_PLANE, _BEHIND, counts)
+    on = np.where((lengths > 1e-6) & (counts[:, 1] < _MOST_BEHIND * len(points)), counts[:, 0], 0.0)
+    best = int(np.argmax(on))
     # the hand itself is flat: a plane worth removing is much larger than a hand
-    if inside[best] < _PLANE_SHARE * len(points):
+    if on[best] < _PLANE_SHARE * len(points):
         return None
-    on = points[np.abs(height[:, best]) < _ON_PLANE]
-    variances, axes = np.linalg.eigh(np.cov(on.T))
+    inside = points[np.abs(points @ planes[best, :3] + planes[best, 3]) < _ON_PLANE]
+    variances, axes = np.linalg.eigh(np.cov(inside.T))
     if np.sqrt(variances[1]) < _PLANE_SPREAD:
         return None
     normal = axes[:, 0] * (-1.0 if axes[2, 0] > 0.0 else 1.0)
-    return np.append(normal, -normal @ on.mean(axis=0))
+    return np.append(normal, -normal @ inside.mean(axis=0))

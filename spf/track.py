@@ -23,7 +23,7 @@ from spf.kernels.cost import Spheres
 from spf.learned.guesses import Guess
 from spf.learned.network import Network, available_network
 from spf.lens import as_stated, seen_through
-from spf.locate import reach_of, seen_at, strangeness_to
+from spf.locate import FAMILIAR, reach_of, seen_at, strangeness_to
 from spf.observation import Observation, Suggestion, observe
 from spf.parallel import map_threads
 from spf.recover import glance, recover, unlikely
@@ -236,18 +236,17 @@ def _stepped(
     return _judged(tracking, state, filter_state, info, looked.seen), info
 
 
-def _strange(tracking: Tracking, info: StepInfo, seen: list[Guess]) -> float:
-    """Golden energy of the estimate, and what it is charged for being strange to the network."""
-    joints = joints_of(tracking.hand, info.estimate, info.reference)
-    return info.estimate_golden + strangeness_to(seen, tracking.hand, joints)
+def _strangeness(tracking: Tracking, info: StepInfo, seen: list[Guess]) -> float:
+    """Golden energy that the estimate is charged for being strange to the network."""
+    return strangeness_to(seen, tracking.hand, joints_of(tracking.hand, info.estimate, info.reference))
 
 
 def _doubts(tracking: Tracking, state: TrackState, new: TrackState, info: StepInfo, seen: list[Guess]) -> int:
     """Count the frames in a row whose estimate explains the depth poorly, or is no hand in the network's eyes."""
     if not seen or state.lost or state.fresh:
         return 0
-    strangeness = _strange(tracking, info, seen) - info.estimate_golden
-    doubted = info.estimate_golden > _believable(state, tracking) or strangeness > _STRANGE
+    strange = _strangeness(tracking, info, seen)
+    doubted = strange > _STRANGE or (info.estimate_golden > _believable(state, tracking) and strange > FAMILIAR)
     return new.doubts + 1 if doubted else 0
 
 
@@ -260,7 +259,8 @@ def _glanced(
     within = _within(new)
     found = glance(frame, tracking.hand, state.held, within, tracking.network, rng)
     here = relative_to_camera(info.estimate, info.reference)
-    if found is None or found[0] > _strange(tracking, info, seen) + unlikely(here, state.held, within) - _CLEARLY:
+    charged = info.estimate_golden + _strangeness(tracking, info, seen) + unlikely(here, state.held, within)
+    if found is None or found[0] > charged - _CLEARLY:
         return None
     fresh = _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)
     return fresh._replace(history=new.history, held=state.held)
@@ -298,18 +298,21 @@ def _judged(
     tracking: Tracking, state: TrackState, filter_state: State, info: StepInfo, seen: list[Guess]
 ) -> TrackState:
     """Notice a loss, and its end: frames in a row that the estimate's render explains much worse than usual, or in which the
-    network sees no hand there, for an elbow can be rendered as well as a hand."""
+    network sees no hand there, for an elbow can be rendered as well as a hand. Where it sees just this hand, something else
+    is within reach that no render of a hand explains."""
     golden = info.estimate_golden
     absent = bool(seen) and max(guess.presence for guess in seen) < _SEEN
-    bad = absent or golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
-    poor = absent or golden > _believable(state, tracking)
+    strange = _strangeness(tracking, info, seen)
+    familiar = bool(seen) and strange < FAMILIAR
+    unexplained = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
+    usual = golden < _believable(state, tracking)
+    bad = absent or (unexplained and not familiar)
     count = state.bad + 1 if bad else 0
-    history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
-    lost = poor if state.lost else count >= _PATIENCE
+    history = (*state.history, golden)[-_HISTORY:] if usual and not (absent or state.lost) else state.history
+    lost = absent or not (usual or familiar) if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
     held = state.held if bad or lost else relative_to_camera(filter_state.estimate, filter_state.reference)
-    charged = _strange(tracking, info, seen)
-    return TrackState(filter_state, lost, history, count, False, charged, missing, held, state.doubts)
+    return TrackState(filter_state, lost, history, count, False, golden + strange, missing, held, state.doubts)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:

@@ -57,8 +57,10 @@ def test_a_place_where_the_network_sees_no_hand_is_strange_however_well_a_hand_f
     hand = load_hand("right")
     joints = joints_of(hand, np.zeros(hand.dofs))
     seen = Guess("right", 1.0, np.zeros(hand.dofs), np.eye(3), joints, np.full(21, 0.01), 0.0, presence=1.0)
-    charges = [strangeness_to([seen._replace(presence=p)], hand, joints) for p in (1.0, 0.6, 0.0)]
-    np.testing.assert_allclose(np.diff(charges), [0.4 * _ABSENT, 0.6 * _ABSENT])
+    charges = [strangeness_to([seen._replace(log_weight=np.log(p))], hand, joints) for p in (1.0, 0.6, 0.1)]
+    np.testing.assert_allclose(np.diff(charges), [0.4 * _ABSENT, 0.5 * _ABSENT])
+    halves = [seen._replace(log_weight=np.log(0.5)) for _ in range(2)]
+    assert strangeness_to(halves, hand, joints) == pytest.approx(0.0)
 
 
 @needs_network
