@@ -16,7 +16,7 @@ from spf.learned.network import Network
 from spf.locate import Seeds, locate, reach_of, strangeness, suggested, unfamiliarity
 from spf.observation import Observation, observe
 from spf.search import SearchSettings
-from spf.segmentation import Region, find_plane, find_regions
+from spf.segmentation import Region, find_regions
 
 __all__ = ["Hypothesis", "hypotheses_of"]
 
@@ -68,8 +68,7 @@ def hypotheses_of(
         rng: randomness.
         thorough: whether to search whole regions besides, where no suggestion convinces.
     """
-    plane = find_plane(frame, rng)
-    regions = find_regions(frame, plane)
+    regions = find_regions(frame)
     size = None if shape is None else shape.hand().length / load_hand(shape.side).length
     looks = [] if network is None else [suggested(network, frame, region, sides, size) for region in regions]
     regions, looks = _promising(regions, looks)
@@ -82,7 +81,7 @@ def hypotheses_of(
             for seeds in [*(looks[number][side] if looks else []), *([None] if thorough else [])]:
                 if seeds is None and _least(found) < _SUGGESTION_ENOUGH:
                     break
-                observation = _around(frame, hand, region, seeds, plane)
+                observation = _around(frame, hand, region, seeds)
                 if observation.is_empty:
                     continue
                 for scale, pose, energy in locate(hand, observation, region.points, settings, rng, seeds):
@@ -102,14 +101,14 @@ def _least(hypotheses: list[Hypothesis]) -> float:
     return min((h.charged for h in hypotheses), default=1.0)
 
 
-def _around(frame: Frame, hand: Hand, region: Region, seeds: Seeds | None, plane: Array | None) -> Observation:
+def _around(frame: Frame, hand: Hand, region: Region, seeds: Seeds | None) -> Observation:
     """Observe what a hand at the first of some seeds would reach, or a whole region.
 
     An arm is no worse a hand for the hand at its other end, which a hypothesis of it leaves uncovered, nor a hand for its arm.
     """
     if seeds is None:
-        return observe(frame, region.centre, region.radius, plane=plane)
-    return observe(frame, seeds.poses[0, :3], reach_of(hand.scaled(float(seeds.scales[0]))), plane=plane)
+        return observe(frame, region.centre, region.radius)
+    return observe(frame, seeds.poses[0, :3], reach_of(hand.scaled(float(seeds.scales[0]))))
 
 
 def _promising(

@@ -25,6 +25,7 @@ from spf.search import Hypotheses, SearchSettings, random_digits, refine, search
 from spf.segmentation import Region
 
 __all__ = [
+    "FAMILIAR",
     "Seeds",
     "around",
     "locate",
@@ -38,12 +39,17 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
+
+#: Golden energy that a pose is charged at most for being strange which is just what the network sees.
+FAMILIAR = 0.1
+
 _POLISHED, _GLANCED = 10, 4  # hypotheses that SMD is run from, in a search and in a glance
 _APART = 0.0125  # m of mean joint distance between two hypotheses worth following
 _LOOKS, _AROUND = 7, 0.07  # places of a region that the network looks at, and m around each that it stands for
 _PLACE, _PLACES = 0.08, 3  # m within which guesses are of one place, and the most places of a side
 _STRANGE = 0.1  # golden energy of a nat per joint under the density …
 _FAMILIAR = 8.0  # … of a hand that the network knows well
+_ABSENT = 0.5  # golden energy of a place where the network sees no hand
 _SURE = 12.0  # the same of a hand whose joints the network is sure of, wherever they are
 _NEAR_SEEDS, _NEAR_MOVED, _NEAR_TURNED = 400, 0.03, 0.4  # poses tried around one, m and rad around it
 
@@ -194,8 +200,9 @@ def _places(found: list[Guess]) -> list[list[Guess]]:
 def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, reference: Array) -> float:
     """Golden energy that a pose (D,) is charged for not being what the network sees where its hand is; 0 without it.
 
-    By the network's density of the pose's joints, ``max Σ log p(x)/J`` over its hypotheses, lengths in the hand's. A render
-    that fits does not tell a fist from an elbow; what is around it does.
+    By the network's density of the pose's joints, ``max Σ log p(x)/J`` over its hypotheses, lengths in the hand's, and by
+    whether it sees a hand of that side there at all. A render that fits does not tell a fist from an elbow; what is around it
+    does.
     """
     if network is None:
         return 0.0
@@ -230,6 +237,8 @@ def seen_at(
 
 def strangeness_to(seen: Sequence[Guess], hand: Hand, joints: Array) -> float:
     """The same of joints (21, 3), m, for who has asked the network already; 0 where it was not asked."""
+    if not seen:
+        return 0.0
 
     def log_density(guess: Guess) -> float:
         spread = _spread(guess)
@@ -237,7 +246,8 @@ def strangeness_to(seen: Sequence[Guess], hand: Hand, joints: Array) -> float:
         per_joint = -apart / spread - 3.0 * np.log(spread / hand.length)
         return float(per_joint.mean()) + guess.log_weight / len(joints)
 
-    return _STRANGE * max(_FAMILIAR - max((log_density(guess) for guess in seen), default=_FAMILIAR), 0.0)
+    absent = 1.0 - float(np.exp([guess.log_weight for guess in seen]).sum())
+    return _STRANGE * max(_FAMILIAR - max(log_density(guess) for guess in seen), 0.0) + _ABSENT * absent
 
 
 def _spread(guess: Guess) -> Array:

@@ -1,4 +1,7 @@
-"""Frame → Observation (spec 3): the foreground around a place, its points and normals, and a coarse copy to render against."""
+"""Frame → Observation (spec 3): the foreground around a place, its points and normals, and a coarse copy to render against.
+
+A table or a wall within reach is no part of it.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from spf.frame import Camera, Frame
 from spf.kernels.cost_inputs import NORMAL, SURFACE_COLUMNS, UNKNOWN, ObservationArrays
 from spf.kernels.surface import coarse_grid, fill_holes, foreground, nearest_pixels, surface_points
+from spf.segmentation import find_plane
 
 __all__ = ["Observation", "Suggestion", "camera_numbers", "observe"]
 
@@ -74,20 +78,20 @@ def camera_numbers(camera: Camera) -> NDArray[np.float64]:
     return np.array([camera.fx, camera.fy, camera.cx, camera.cy, float(camera.model == "pinhole")])
 
 
-def observe(frame: Frame, centre: ArrayLike, radius: float, plane: ArrayLike | None = None) -> Observation:
-    """Cut out and measure the surface within a sphere, as it is seen by the camera.
+def observe(frame: Frame, centre: ArrayLike, radius: float) -> Observation:
+    """Cut out and measure the surface within a sphere, as it is seen by the camera, a table or wall left out.
 
     Args:
         frame: the depth image.
         centre: (3,) m, where the hand's palm is expected.
         radius: m, reach of a hand around it.
-        plane: (4,) (n, d) with n·X + d = 0 of a table or wall to leave out, n towards the camera; or None.
 
     Returns:
         The observation; :attr:`Observation.is_empty` when nothing is there.
     """
     c = np.asarray(centre, dtype=np.float64)
-    front = np.array([0.0, 0.0, 0.0, 1.0]) if plane is None else np.asarray(plane, dtype=np.float64)
+    plane = find_plane(frame)
+    front = np.array([0.0, 0.0, 0.0, 1.0]) if plane is None else plane
     window = _crop(frame, c, radius)
     mask = np.empty(window.depth.shape, np.uint8)
     top, bottom, left, right = foreground(

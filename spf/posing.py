@@ -24,7 +24,7 @@ from spf.locate import reach_of, suggested
 from spf.observation import Observation, observe
 from spf.optimisers.smd import optimise
 from spf.progress import Report, part_of, silent
-from spf.segmentation import Region, find_plane, find_regions
+from spf.segmentation import Region, find_regions
 
 __all__ = ["Explained", "calibrated_from", "explained", "first_stance", "fitted_from", "open_hand"]
 
@@ -53,10 +53,10 @@ def first_stance(frame: Frame, shape: HandShape, rng: np.random.Generator) -> St
     Args:
         frame: as its session states it.
         shape: of the hand.
-        rng: randomness of finding a table.
+        rng: randomness.
     """
     frame, hand = seen_through(frame, shape.lens), shape.hand()
-    regions = find_regions(frame, find_plane(frame, rng))
+    regions = find_regions(frame)
     network, _ = available_network()
     if regions and network is not None:
         size = hand.length / HandShape(shape.side).hand().length

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from spf.frame import Frame
-from spf.hand.kinematics import rotation_about
+from spf.hand.kinematics import joints_of, rotation_about
 from spf.hand.model import Hand, load_hand
 from spf.learned.network import Network
-from spf.locate import Seeds, around, locate, polished, reach_of, strangeness, suggested
+from spf.locate import FAMILIAR, Seeds, around, locate, polished, reach_of, seen_at, strangeness_to, suggested
 from spf.observation import Observation, observe
 from spf.search import SearchSettings
-from spf.segmentation import find_plane, find_regions
+from spf.segmentation import find_regions
 
-__all__ = ["glance", "recover"]
+__all__ = ["glance", "recover", "unlikely"]
 
 Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
@@ -31,6 +31,7 @@ def recover(
     frame: Frame,
     hand: Hand,
     limit: float,
+    better: float,
     last: Array,
     within: float,
     missing: int,
@@ -43,6 +44,7 @@ def recover(
         frame: the depth image.
         hand: the calibrated hand.
         limit: golden energy under which a pose is believed; one that is held otherwise than it was needs a lower one.
+        better: the same of a pose that is what the network sees there, for which it is enough to be better than the last.
         last: (D,) the pose that it was lost in, relative to the camera's axes.
         within: m that its palm can have moved since.
         missing: frames since it was lost: the longer, the less counts how it was held.
@@ -57,24 +59,21 @@ def recover(
 
     def believed(found: list[tuple[float, Array, float]]) -> Array | None:
         near = [(energy, pose) for _, pose, energy in found if np.linalg.norm(pose[:3] - last[:3]) < within]
-        rated = [
-            (
-                energy
-                + remembered * _unlikely(pose, last, within)
-                + strangeness(network, frame, hand, pose, np.eye(3)),
-                pose,
-            )
-            for energy, pose in near
-        ]
-        best = min(rated, key=lambda item: item[0], default=None)
-        return best[1] if best is not None and best[0] < limit else None
+        rated = []
+        for energy, pose in near:
+            charge = _strange(network, frame, hand, pose)
+            believable = max(limit, better) if network is not None and charge < FAMILIAR else limit
+            charged = energy + remembered * unlikely(pose, last, within) + charge
+            if charged < believable:
+                rated.append((charged, pose))
+        return min(rated, key=lambda item: item[0])[1] if rated else None
 
     near = observe(frame, last[:3], reach_of(hand))
     if not near.is_empty:
         pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
         if pose is not None:
             return pose
-    for place in _places(network, frame, hand, last, rng):
+    for place in _places(network, frame, hand, last):
         pose = believed(locate(hand, place.observation, place.points, settings, rng, place.seeds))
         if pose is not None:
             return pose
@@ -96,21 +95,29 @@ def glance(
         best, or None when there is none.
     """
     best: tuple[float, Array] | None = None
-    for place in _places(network, frame, hand, last, rng):
+    for place in _places(network, frame, hand, last):
         assert place.seeds is not None
         for _, pose, energy in polished(hand, place.observation, place.seeds.poses, rng):
             if np.linalg.norm(pose[:3] - last[:3]) > within:
                 continue
-            charged = energy + _unlikely(pose, last, within) + strangeness(network, frame, hand, pose, np.eye(3))
+            charged = energy + unlikely(pose, last, within) + _strange(network, frame, hand, pose)
             if best is None or charged < best[0]:
                 best = charged, pose
     return best
 
 
-def _unlikely(pose: Array, last: Array, within: float) -> float:
+def unlikely(pose: Array, last: Array, within: float) -> float:
     """What a pose is charged for being elsewhere, and held otherwise, than the last one (D,); both by the camera's axes."""
     turn = Rotation.from_matrix(rotation_about(pose[3:6]) @ rotation_about(last[3:6]).T).magnitude()
     return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi)
+
+
+def _strange(network: Network | None, frame: Frame, hand: Hand, pose: Array) -> float:
+    """What a pose relative to the camera's axes is charged for not being what the network sees: a hand so held, of this side."""
+    if network is None:
+        return 0.0
+    seen = seen_at(network, frame, hand, pose, np.eye(3), ("right", "left"))
+    return strangeness_to([guess for guess in seen if guess.side == hand.side], hand, joints_of(hand, pose))
 
 
 class _Place(NamedTuple):
@@ -121,24 +128,21 @@ class _Place(NamedTuple):
     seeds: Seeds | None
 
 
-def _places(
-    network: Network | None, frame: Frame, hand: Hand, last: Array, rng: np.random.Generator
-) -> Iterator[_Place]:
+def _places(network: Network | None, frame: Frame, hand: Hand, last: Array) -> Iterator[_Place]:
     """Go over the places where the network sees a hand, the nearest to the last one first; without it, over whole regions.
 
     What is seen is cut out around the place, as it is for the tracker: so golden energies compare with the tracker's.
     """
-    plane = find_plane(frame, rng)
-    regions = find_regions(frame, plane)
+    regions = find_regions(frame)
     size = hand.length / load_hand(hand.side).length
     for region in regions[:_REGIONS]:
         if network is None:
-            looked = observe(frame, region.centre, region.radius, plane=plane)
+            looked = observe(frame, region.centre, region.radius)
             if not looked.is_empty:
                 yield _Place(looked, region.points, None)
             continue
         seen = [s for s in suggested(network, frame, region, (hand.side,), size)[hand.side] if s.presence > _SEEN]
         for seeds in sorted(seen, key=lambda seeds: float(np.linalg.norm(seeds.poses[0, :3] - last[:3]))):
-            looked = observe(frame, seeds.poses[0, :3], reach_of(hand), plane=plane)
+            looked = observe(frame, seeds.poses[0, :3], reach_of(hand))
             if not looked.is_empty:
                 yield _Place(looked, region.points, seeds)

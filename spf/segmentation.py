@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.frame import Frame
+from spf.kernels.surface import count_by_planes
 
 __all__ = ["Region", "find_plane", "find_regions"]
 
@@ -20,6 +21,8 @@ _FARTHEST = 2.5  # m
 _LARGEST_RADIUS = 0.40  # m
 _PLANE_SHARE = 0.25  # share of the readings that make a plane a table or a wall
 _PLANE_TRIALS = 60
+_PLANE_SPREAD = 0.12  # m, standard deviation of such a plane's readings along its narrower side, at least
+_ON_PLANE, _BEHIND, _MOST_BEHIND = 0.01, 0.02, 0.02  # m from a plane, m behind it, and the most readings behind it
 
 
 class Region(NamedTuple):
@@ -38,15 +41,14 @@ class Region(NamedTuple):
     area: float
 
 
-def find_regions(frame: Frame, plane: Array | None = None, most: int = 3) -> list[Region]:
-    """List places where a hand may be, nearest first.
+def find_regions(frame: Frame, most: int = 3) -> list[Region]:
+    """List places where a hand may be, nearest first, a table or wall left out.
 
     A component of the scene counts when it shows enough surface within a window of depth that starts at the component
     (not at the nearest pixel: a speck in front of the hand must not cut it).
 
     Args:
         frame: the depth image.
-        plane: (4,) table or wall to leave out, from :func:`find_plane`.
         most: longest list returned.
     """
     factor = max(1, round(frame.depth.shape[1] / _WIDTH))
@@ -55,6 +57,7 @@ def find_regions(frame: Frame, plane: Array | None = None, most: int = 3) -> lis
     v, u = np.mgrid[: depth.shape[0], : depth.shape[1]]
     points = camera.back_project(u, v, depth)
     valid = (depth > 0.1) & (depth < _FARTHEST)
+    plane = find_plane(frame)
     if plane is not None:
         valid &= points @ plane[:3] + plane[3] > 0.012
     per_pixel = depth / camera.fx if camera.model == "pinhole" else np.full(depth.shape, 1.0 / camera.fx)
@@ -98,8 +101,11 @@ def _region(points: Array, area: Array) -> Region:
     return Region(centre, min(reach, _LARGEST_RADIUS), chosen, float(area.sum()))
 
 
-def find_plane(frame: Frame, rng: np.random.Generator) -> Array | None:
+def find_plane(frame: Frame) -> Array | None:
     """Find a table or a wall: the plane that holds a large share of the readings, with nothing behind it.
+
+    Among planes through three readings each (RANSAC, Fischler and Bolles 1981, with the same draws in every frame), the one
+    with the most readings, then the one closest to these.
 
     Returns:
         (4,) (n, d) with n·X + d = 0, n towards the camera; None when no plane dominates.
@@ -107,27 +113,25 @@ def find_plane(frame: Frame, rng: np.random.Generator) -> Array | None:
     factor = max(1, round(frame.depth.shape[1] / 80))
     depth = frame.depth[::factor, ::factor]
     camera = frame.camera.subsample(factor)
-    v, u = np.nonzero(depth > 0)
+    v, u = np.nonzero((depth > 0) & np.isfinite(depth))
     if len(v) < 100:
         return None
     points = camera.back_project(u, v, depth[v, u])
-    best, most = None, 0
-    for _ in range(_PLANE_TRIALS):
-        a, b, c = points[rng.choice(len(points), 3, replace=False)]
-        normal = np.cross(b - a, c - a)
-        length = np.linalg.norm(normal)
-        if length < 1e-6:
-            continue
-        normal = normal / length
-        normal *= -np.sign(normal[2]) or 1.0
-        offset = -normal @ a
-        height = points @ normal + offset
-        inside = int((np.abs(height) < 0.01).sum())
-        if inside > most and (height < -0.02).mean() < 0.02:
-            best, most = np.append(normal, offset), inside
+    a, b, c = points[np.random.default_rng(0).integers(len(points), size=(3, _PLANE_TRIALS))]
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    normals *= (np.where(normals[:, 2] > 0.0, -1.0, 1.0) / np.maximum(lengths, 1e-12))[:, None]
+    planes = np.column_stack([normals, -(a * normals).sum(axis=1)])
+    counts = np.empty((_PLANE_TRIALS, 2))
+    count_by_planes(points, planes, _ON_PLANE, _BEHIND, counts)
+    on = np.where((lengths > 1e-6) & (counts[:, 1] < _MOST_BEHIND * len(points)), counts[:, 0], 0.0)
+    best = int(np.argmax(on))
     # the hand itself is flat: a plane worth removing is much larger than a hand
-    if best is None or most < _PLANE_SHARE * len(points):
+    if on[best] < _PLANE_SHARE * len(points):
         return None
-    on = points[np.abs(points @ best[:3] + best[3]) < 0.01]
-    spread = np.sqrt(np.linalg.eigvalsh(np.cov(on.T))[1:])
-    return best if spread[0] > 0.12 else None
+    inside = points[np.abs(points @ planes[best, :3] + planes[best, 3]) < _ON_PLANE]
+    variances, axes = np.linalg.eigh(np.cov(inside.T))
+    if np.sqrt(variances[1]) < _PLANE_SPREAD:
+        return None
+    normal = axes[:, 0] * (-1.0 if axes[2, 0] > 0.0 else 1.0)
+    return np.append(normal, -normal @ inside.mean(axis=0))

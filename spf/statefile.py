@@ -40,6 +40,7 @@ def write_states(states: Mapping[int, TrackState], path: Path) -> None:
         "reference": np.array([state.filter.reference for state in kept]),
         "estimate": np.array([state.filter.estimate for state in kept]),
         "time": np.array([state.filter.time for state in kept]),
+        "held": np.array([state.held for state in kept]),
     }
     arrays |= {name: np.array([getattr(state, name) for state in kept]) for name in _NUMBERS[1:]}
     for name in ParticleSet._fields:
@@ -82,6 +83,6 @@ def _states_of(arrays: dict[str, NDArray[Any]]) -> dict[int, TrackState]:
         filter_state = State(particles, arrays["reference"][i], arrays["estimate"][i], float(time))
         states[int(frame)] = TrackState(
             filter_state, bool(lost), tuple(float(value) for value in history), int(bad), bool(fresh), float(golden),
-            int(missing), int(doubts),
+            int(missing), arrays["held"][i], int(doubts),
         )  # fmt: skip
     return states

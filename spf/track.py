@@ -23,10 +23,10 @@ from spf.kernels.cost import Spheres
 from spf.learned.guesses import Guess
 from spf.learned.network import Network, available_network
 from spf.lens import as_stated, seen_through
-from spf.locate import reach_of, seen_at, strangeness_to
+from spf.locate import FAMILIAR, reach_of, seen_at, strangeness_to
 from spf.observation import Observation, Suggestion, observe
 from spf.parallel import map_threads
-from spf.recover import glance, recover
+from spf.recover import glance, recover, unlikely
 from spf.settings import Settings
 from spf.trackers import TRACKERS
 
@@ -37,8 +37,9 @@ _HISTORY = 30  # golden energies that a loss is judged against
 _PATIENCE = 3  # bad frames in a row that make a loss
 _FIRST_EFFORT = 3.0
 _FRAME = 1.0 / 30.0  # s
+_SEEN = 0.3  # presence of a hand where it is tracked, in the network's eyes, under which a frame is bad
 _STRANGE = 0.3  # golden energy that an estimate is charged by the network, over which it is doubted
-_CLEARLY = 0.05  # golden energy that a hand elsewhere must be better by than a doubted one
+_CLEARLY = 0.05  # golden energy that a hand elsewhere must be better by than a doubted one, or where a lost one was
 _NEAR, _STRIDE = 0.15, 0.03  # m around its last place that a hand is looked for in, and how much it grows a frame
 
 
@@ -73,8 +74,9 @@ class TrackState(NamedTuple):
         history: recent golden energies of good frames.
         bad: bad frames in a row.
         fresh: whether the pose was just found and no frame has refined it.
-        golden: golden energy of the last estimate; 1 when there is none.
+        golden: golden energy of the last estimate, and what it is charged for being strange; 1 when there is none.
         missing: frames since the hand was lost.
+        held: (D,) the last estimate before those bad frames, relative to the camera's axes: where a hand is looked for.
         doubts: frames in a row in which the estimate may be on something else than the hand.
     """
 
@@ -85,6 +87,7 @@ class TrackState(NamedTuple):
     fresh: bool
     golden: float
     missing: int
+    held: Array
     doubts: int = 0
 
 
@@ -139,7 +142,7 @@ def begin(
 def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
     state = start_at(tracking.hand, pose, reference, time_, count)
-    return TrackState(state, False, (), 0, True, 1.0, 0)
+    return TrackState(state, False, (), 0, True, 1.0, 0, relative_to_camera(pose, reference))
 
 
 def track_frame(
@@ -168,16 +171,15 @@ def track_frame(
     if looked.observation.is_empty:
         state = state._replace(lost=True, missing=state.missing + 1)
         return state, _lost(tracking, state, frame, began)
-    new, info = _stepped(tracking, state, looked.observation, rng, record)
+    new, info = _stepped(tracking, state, looked, rng, record)
     doubts = _doubts(tracking, state, new, info, looked.seen)
-    observation = looked.observation
     # A glance takes several frames' time: it is taken at the first doubt in a row, the second, the fourth, …
     if doubts and doubts & (doubts - 1) == 0:
         elsewhere = _glanced(tracking, state, new, info, looked.seen, frame, rng)
         if elsewhere is not None:
             state, doubts = elsewhere, 0
-            observation = _look(tracking, state, frame).observation
-            new, info = _stepped(tracking, state, observation, rng, record)
+            looked = _look(tracking, state, frame)
+            new, info = _stepped(tracking, state, looked, rng, record)
     new = new._replace(doubts=doubts)
     joints = stated_joints(tracking, info.estimate, info.reference)
     timings = {
@@ -189,7 +191,7 @@ def track_frame(
     result = TrackedFrame(
         frame.index, frame.time, info.estimate, info.reference, joints, new.lost, was_lost and not new.lost,
         info.estimate_log_likelihood, info.ess, info.estimate_golden, info.estimate_overlap, seconds, timings,
-        info, observation, state.filter.estimate[:3],
+        info, looked.observation, state.filter.estimate[:3],
     )  # fmt: skip
     return new, result
 
@@ -225,27 +227,26 @@ def _seen(tracking: Tracking, state: TrackState, frame: Frame) -> list[Guess]:
 
 
 def _stepped(
-    tracking: Tracking, state: TrackState, observation: Observation, rng: np.random.Generator, record: bool
+    tracking: Tracking, state: TrackState, looked: _Looked, rng: np.random.Generator, record: bool
 ) -> tuple[TrackState, StepInfo]:
     filter_state, info = TRACKERS[tracking.tracker].step(
-        rng, state.filter, observation, tracking.hand, tracking.settings,
+        rng, state.filter, looked.observation, tracking.hand, tracking.settings,
         spheres=tracking.spheres, record=record, effort=_FIRST_EFFORT if state.fresh else 1.0,
     )  # fmt: skip
-    return _judged(tracking, state, filter_state, info), info
+    return _judged(tracking, state, filter_state, info, looked.seen), info
 
 
-def _strange(tracking: Tracking, info: StepInfo, seen: list[Guess]) -> float:
-    """Golden energy of the estimate, and what it is charged for being strange to the network."""
-    joints = joints_of(tracking.hand, info.estimate, info.reference)
-    return info.estimate_golden + strangeness_to(seen, tracking.hand, joints)
+def _strangeness(tracking: Tracking, info: StepInfo, seen: list[Guess]) -> float:
+    """Golden energy that the estimate is charged for being strange to the network."""
+    return strangeness_to(seen, tracking.hand, joints_of(tracking.hand, info.estimate, info.reference))
 
 
 def _doubts(tracking: Tracking, state: TrackState, new: TrackState, info: StepInfo, seen: list[Guess]) -> int:
     """Count the frames in a row whose estimate explains the depth poorly, or is no hand in the network's eyes."""
     if not seen or state.lost or state.fresh:
         return 0
-    strangeness = _strange(tracking, info, seen) - info.estimate_golden
-    doubted = info.estimate_golden > _believable(state, tracking) or strangeness > _STRANGE
+    strange = _strangeness(tracking, info, seen)
+    doubted = strange > _STRANGE or (info.estimate_golden > _believable(state, tracking) and strange > FAMILIAR)
     return new.doubts + 1 if doubted else 0
 
 
@@ -255,23 +256,32 @@ def _glanced(
 ) -> TrackState | None:  # fmt: skip
     """Look elsewhere when the estimate is doubted; a state that begins there, when a hand explains clearly more there."""
     assert tracking.network is not None
-    last = relative_to_camera(state.filter.estimate, state.filter.reference)
-    found = glance(frame, tracking.hand, last, _NEAR + _STRIDE, tracking.network, rng)
-    if found is None or found[0] > _strange(tracking, info, seen) - _CLEARLY:
+    within = _within(new)
+    found = glance(frame, tracking.hand, state.held, within, tracking.network, rng)
+    here = relative_to_camera(info.estimate, info.reference)
+    charged = info.estimate_golden + _strangeness(tracking, info, seen) + unlikely(here, state.held, within)
+    if found is None or found[0] > charged - _CLEARLY:
         return None
-    return _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)._replace(history=new.history)
+    fresh = _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)
+    return fresh._replace(history=new.history, held=state.held)
 
 
 def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.Generator) -> TrackState:
     """Search for a lost hand; the state goes on from where it was when nothing better is found."""
     limit = min(_believable(state, tracking), 0.8 * state.golden)
-    within = _NEAR + _STRIDE * state.missing
-    last = relative_to_camera(state.filter.estimate, state.filter.reference)
-    found = recover(frame, tracking.hand, limit, last, within, state.missing, tracking.network, rng)
+    within = _within(state)
+    here = relative_to_camera(state.filter.estimate, state.filter.reference)
+    better = state.golden + unlikely(here, state.held, within) - _CLEARLY
+    found = recover(frame, tracking.hand, limit, better, state.held, within, state.missing, tracking.network, rng)
     if found is None:
         return state
     fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
-    return fresh._replace(history=state.history, lost=True)
+    return fresh._replace(history=state.history, lost=True, bad=state.bad, missing=state.missing, held=state.held)
+
+
+def _within(state: TrackState) -> float:
+    """Metres that a hand can be away from where it was held: the more, the longer that is ago."""
+    return _NEAR + _STRIDE * max(state.bad, state.missing, 1)
 
 
 def _usual(state: TrackState, tracking: Tracking) -> float:
@@ -284,16 +294,25 @@ def _believable(state: TrackState, tracking: Tracking) -> float:
     return max(1.3 * _usual(state, tracking) + 0.06, 0.3)
 
 
-def _judged(tracking: Tracking, state: TrackState, filter_state: State, info: StepInfo) -> TrackState:
-    """Notice a loss, frames in a row that the estimate's render explains much worse than usual, and its end."""
+def _judged(
+    tracking: Tracking, state: TrackState, filter_state: State, info: StepInfo, seen: list[Guess]
+) -> TrackState:
+    """Notice a loss, and its end: frames in a row that the estimate's render explains much worse than usual, or in which the
+    network sees no hand there, for an elbow can be rendered as well as a hand. Where it sees just this hand, something else
+    is within reach that no render of a hand explains."""
     golden = info.estimate_golden
-    bad = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
-    poor = golden > _believable(state, tracking)
+    absent = bool(seen) and max(guess.presence for guess in seen) < _SEEN
+    strange = _strangeness(tracking, info, seen)
+    familiar = bool(seen) and strange < FAMILIAR
+    unexplained = golden > max(1.6 * _usual(state, tracking) + 0.12, 0.45) or info.estimate_overlap < 0.3
+    usual = golden < _believable(state, tracking)
+    bad = absent or (unexplained and not familiar)
     count = state.bad + 1 if bad else 0
-    history = state.history if poor or state.lost else (*state.history, golden)[-_HISTORY:]
-    lost = poor if state.lost else count >= _PATIENCE
+    history = (*state.history, golden)[-_HISTORY:] if usual and not (absent or state.lost) else state.history
+    lost = absent or not (usual or familiar) if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
-    return TrackState(filter_state, lost, history, count, False, golden, missing, state.doubts)
+    held = state.held if bad or lost else relative_to_camera(filter_state.estimate, filter_state.reference)
+    return TrackState(filter_state, lost, history, count, False, golden + strange, missing, held, state.doubts)
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:

@@ -5,11 +5,14 @@ import pytest
 
 from benchmarks.holds.kidnaps import kidnapped
 from benchmarks.holds.sessions import session_settings
+from spf.hand.kinematics import joints_of, pose_hand
 from spf.hand.model import load_hand
+from spf.learned.guesses import Guess, extent_of, guesses
 from spf.learned.network import available_network
-from spf.locate import _AROUND, _LOOKS, _looks, strangeness_to
+from spf.locate import _ABSENT, _AROUND, _LOOKS, _looks, seen_at, strangeness_to
 from spf.prepare import prepare
 from spf.synthetic import synthesise
+from spf.synthetic.clutter import _forearm_mesh
 from spf.track import begin, track_frame
 from spf.trackers import make_settings
 
@@ -48,3 +51,56 @@ def test_the_network_looks_at_both_ends_of_what_is_there(rng):
 
 def test_nothing_is_strange_to_a_network_that_is_not_asked():
     assert strangeness_to([], load_hand("right"), np.zeros((21, 3))) == 0.0
+
+
+def test_a_place_where_the_network_sees_no_hand_is_strange_however_well_a_hand_fits_there():
+    hand = load_hand("right")
+    joints = joints_of(hand, np.zeros(hand.dofs))
+    seen = Guess("right", 1.0, np.zeros(hand.dofs), np.eye(3), joints, np.full(21, 0.01), 0.0, presence=1.0)
+    charges = [strangeness_to([seen._replace(log_weight=np.log(p))], hand, joints) for p in (1.0, 0.6, 0.1)]
+    np.testing.assert_allclose(np.diff(charges), [0.4 * _ABSENT, 0.5 * _ABSENT])
+    halves = [seen._replace(log_weight=np.log(0.5)) for _ in range(2)]
+    assert strangeness_to(halves, hand, joints) == pytest.approx(0.0)
+
+
+@needs_network
+def test_the_network_sees_hands_and_no_elbows():
+    network = available_network()[0]
+    at_hand, at_elbow = [], []
+    for number in range(6):
+        session = kidnapped(synthesise(session_settings("body", number, 8)), 3, np.random.default_rng([number, 11]))
+        frame, trajectory, hand = session[4], session.stage.trajectory, session.hand
+        _, elbow = _forearm_mesh(hand, pose_hand(hand, trajectory.poses[4], trajectory.orientations[4]))
+        pixel = frame.camera.project(elbow[None])[0]
+        if (pixel < 0).any() or (pixel > (frame.camera.width, frame.camera.height)).any():
+            continue
+        for places, seen in ((frame.truth.joints.mean(axis=0), at_hand), (elbow, at_elbow)):
+            found = guesses(network, frame.depth, frame.camera, places, extent_of(1.0), [hand.side])
+            seen.append(max(guess.presence for guess in found))
+    assert len(at_elbow) > 2
+    assert np.median(at_hand) > 0.9
+    assert np.median(at_elbow) < 0.3
+
+
+@needs_network
+def test_a_hand_is_lost_where_the_network_sees_none_however_well_it_is_rendered(monkeypatch):
+    def blind(*arguments):
+        return [guess._replace(presence=0.1) for guess in seen_at(*arguments)]
+
+    session = synthesise(session_settings("slow", 0, 4))
+    start = prepare(session, init="truth", seed=0)
+
+    def run():
+        tracking, state = begin("spf", make_settings("spf"), start, 0, time=float(session.times[0]))
+        results = []
+        for frame in session:
+            state, result = track_frame(tracking, state, frame)
+            results.append(result)
+        return [result.lost for result in results], max(result.golden for result in results)
+
+    assert run()[0] == [False] * 4
+    monkeypatch.setattr("spf.track.seen_at", blind)
+    monkeypatch.setattr("spf.locate.seen_at", blind)
+    lost, golden = run()
+    assert lost == [False, False, True, True]
+    assert golden < 0.3

@@ -52,7 +52,13 @@ class Detail:
         self._tabs.offer("scene", lambda: SceneTab(state, renderer))
         switch = pmu.RadioButtonGroup.from_param(
             state.look.param.tab, name="", options=TABS, size="small", margin=(0, 8),
-            sx={"& .MuiToggleButton-root": {"textTransform": "none", "padding": "3px 14px", "whiteSpace": "nowrap"}},
+            stylesheets=[":host { max-width: calc(100% - 16px); }"],
+            sx={
+                "flexWrap": "wrap",
+                "& .MuiToggleButton-root": {
+                    "textTransform": "none", "padding": "3px 14px", "whiteSpace": "nowrap", "width": "auto",
+                },
+            },
         )  # fmt: skip
         self._views = viewpoints(state)
         head = pn.FlexBox(

@@ -62,8 +62,8 @@ STAGES = (
         "small h trusts the predicted samples, a large one the optimised ones.</p>"
         "<p>The weighted mean is the estimate: the blue hand among the observed points. The <b>effective sample size</b> says "
         "how many particles carry the weight; 1 means that a single one does.</p>"
-        "<p>When the estimate explains the depth much worse than usual for three frames, the hand counts as <b>lost</b> and is "
-        "searched for in the whole picture.</p>",
+        "<p>When the estimate explains the depth much worse than usual for three frames, or the network sees no hand "
+        "there, the hand counts as <b>lost</b> and is searched for in the whole picture.</p>",
         "reconstruction",
     ),
 )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from spf.kernels.compiling import index, kernel, part, strict_kernel
 from spf.kernels.cost_inputs import EMPTY, HAND, LABEL, NORMAL
 
-__all__ = ["coarse_grid", "fill_holes", "foreground", "nearest_pixels", "surface_points"]
+__all__ = ["coarse_grid", "count_by_planes", "fill_holes", "foreground", "nearest_pixels", "surface_points"]
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -18,6 +18,27 @@ Mask = NDArray[np.uint8]
 Indices = NDArray[np.int32]
 
 _OFF_PLANE = 0.012  # m from a table or wall from which a surface is not it
+
+
+@strict_kernel
+def count_by_planes(points: Array, planes: Array, on: float, behind: float, counts: Array) -> None:
+    """Count the points on each of some planes, and behind it.
+
+    Args:
+        points: (N, 3) m.
+        planes: (T, 4) (n, d), n·X + d > 0 in front.
+        on: m from the plane, either way, within which a point is on it.
+        behind: m behind the plane from which a point is behind it.
+        counts: (T, 2) out: points on it, points behind it.
+    """
+    for t in range(planes.shape[0]):
+        a, b, c, d = planes[t, 0], planes[t, 1], planes[t, 2], planes[t, 3]
+        near, far = 0, 0
+        for i in range(points.shape[0]):
+            height = a * points[i, 0] + b * points[i, 1] + c * points[i, 2] + d
+            near += abs(height) < on
+            far += height < -behind
+        counts[t, 0], counts[t, 1] = near, far
 
 
 @strict_kernel

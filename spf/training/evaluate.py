@@ -40,10 +40,11 @@ def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_
         median joint errors, mm, of the most probable and of the best hypothesis (both as predicted and posed), of the
         palm's centre, of the palm's rotation in degrees, of the size in per cent; the error of the most probable by view,
         and of hands that are as near to the cube's centre and size as when they are tracked; and how often side (by all
-        that is known, by the output alone) and presence are right.
+        that is known, by the output alone) and presence are right, a hand is seen where none is, and one that is there missed.
     """
     batch = Generator(seed, _HELD_OUT_SHAPES).batch(0, samples, left_share=0.5)
     straight, mirrored = network.outputs(batch.crops), network.outputs(batch.crops[:, :, ::-1])
+    seen = straight[:, layout.PRESENT] > 0.0
     there, right = batch.present > 0.5, batch.right > 0.5
     sides = side_evidence(np.stack([straight, mirrored]))
     logits = straight[:, layout.RIGHT] - mirrored[:, layout.RIGHT]
@@ -66,7 +67,9 @@ def evaluate_synthetic(network: Network, samples: int = 2000, seed: int = _HELD_
         | {
             "right_side": float(np.mean((sides[0] > sides[1])[there] == right[there])),
             "right_side_by_output": float(np.mean((logits > 0.0)[there] == right[there])),
-            "right_presence": float(np.mean((straight[:, layout.PRESENT] > 0.0) == there)),
+            "right_presence": float(np.mean(seen == there)),
+            "seen_where_none_is": float(np.mean(seen[~there])),
+            "missed": float(np.mean(~seen[there])),
         }
     )
 

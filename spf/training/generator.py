@@ -66,7 +66,7 @@ class Generator:
     def batch(self, number: int, n: int, left_share: float = 0.18) -> Batch:
         """Make batch ``number`` of n samples, of which a share are mirrored."""
         rng = np.random.default_rng([self.seed, 3, number])
-        scenes, left = draw_scenes(rng, n, self.table, left_share)
+        scenes, left, present = draw_scenes(rng, n, self.table, left_share)
         crops = np.empty((n, CROP_SIZE, CROP_SIZE), np.float32)
         joints = np.empty((n, 21, 3))
         draw_samples(self._arrays, scenes, self._pools, crops, joints)
@@ -81,6 +81,6 @@ class Generator:
             scenes.poses[:, ARTICULATED].astype(np.float32),
             (scenes.extents / scenes.away).astype(np.float32),
             np.log(load_hand("right").length * self.table.sizes[scenes.shape] / scenes.extents).astype(np.float32),
-            scenes.drawn.astype(np.float32),
+            present.astype(np.float32),
             (~left).astype(np.float32),
         )

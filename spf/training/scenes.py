@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 _HAND_MIDDLE = np.array([-0.005, -0.005, -0.035])  # m, middle of the joints of the bundled hand, model frame
 _RINGS, _BLOBS = 10, 3
 _EMPTY_SHARE = 0.05
+_ELBOW_SHARE = 0.1  # of the other scenes
 _POOL = 1 << 22
 _ABSENT = -1.0  # coordinates of what is not drawn: behind the camera
 
@@ -42,10 +43,12 @@ class Scenes(NamedTuple):
     Attributes:
         kernel: what the kernel draws.
         left: (N,) whether the crop is to be mirrored, so that it shows a left hand.
+        present: (N,) whether a hand is in the cube: not in an empty scene, nor around an elbow.
     """
 
     kernel: SampleScenes
     left: NDArray[np.bool_]
+    present: NDArray[np.bool_]
 
 
 def other_faces(first: int) -> NDArray[np.int32]:
@@ -66,9 +69,12 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
     middles = _jitter(rng, n) * extents[:, None]
     middles[:, 2] += away
     empty = rng.random(n) < _EMPTY_SHARE
+    elbow = ~empty & (rng.random(n) < _ELBOW_SHARE)
     poses = np.zeros((n, 26))
     poses[:, 6:] = draw_articulations(rng, n)
     poses[:, :3] = middles - np.einsum("nij,nj->ni", orientations, size[:, None] * _HAND_MIDDLE)
+    others, moved = _others(rng, shapes, shape, poses, orientations, away, extents, empty, elbow)
+    poses[:, :3] += moved
     focal = np.exp(rng.uniform(np.log(0.75), np.log(2.1), n)) * CROP_SIZE * away / extents
     sizes = np.minimum(np.ceil(focal * extents / away * 1.03) + 4, LARGEST_PICTURE).astype(np.int64)
     kernel = SampleScenes(
@@ -76,7 +82,7 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
         drawn=~empty,
         poses=poses,
         orientations=orientations,
-        others=_others(rng, shapes, shape, poses, orientations, away, extents, empty),
+        others=others,
         planes=_planes(rng, n, extents, np.where(empty, 0.35, 0.1)),
         away=away,
         extents=extents,
@@ -85,7 +91,7 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
         faults=_faults(rng, n),
         starts=rng.integers(_POOL, size=n),
     )
-    return Scenes(kernel, rng.random(n) < left_share)
+    return Scenes(kernel, rng.random(n) < left_share, ~(empty | elbow))
 
 
 def _orientations(rng: np.random.Generator, n: int) -> Array:
@@ -115,19 +121,43 @@ def _jitter(rng: np.random.Generator, n: int) -> Array:
 
 def _others(
     rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], poses: Array, orientations: Array,
-    away: Array, extents: Array, empty: NDArray[np.bool_],
-) -> Array:  # fmt: skip
-    """Vertices (n, W, 3) of forearm and blobs."""
-    arm = _forearms(rng, shapes, shape, poses, orientations)
-    arm[rng.random(len(shape)) < np.where(empty, 0.4, 0.06)] = _ABSENT
+    away: Array, extents: Array, empty: NDArray[np.bool_], elbow: NDArray[np.bool_],
+) -> tuple[Array, Array]:  # fmt: skip
+    """Vertices (n, W, 3) of forearm and blobs, and how far (n, 3) all hands are moved so that some elbows are in the middle."""
+    arm = _forearms(rng, shapes, shape, poses, orientations, elbow)
     centres = np.stack([np.zeros_like(away), np.zeros_like(away), away], axis=1)
+    ends = centres + rng.normal(0.0, 0.08, arm[:, -1].shape) * extents[:, None]
+    moved = np.where(elbow[:, None], ends - arm[:, -1], 0.0)
+    arm += moved[:, None]
+    width = np.linalg.norm(arm[:, -3] - arm[:, -1], axis=1)  # a vertex of the last ring, and the middle of its cap
+    arm[rng.random(len(shape)) < np.select([empty, elbow], [0.4, 0.0], 0.06)] = _ABSENT
     blobs = [_blobs(rng, centres, extents, np.where(empty, 0.4, 0.08)) for _ in range(_BLOBS)]
-    return np.concatenate([arm, *blobs], axis=1)
+    for blob, part in zip(blobs, (_round_elbows, _upper_arms), strict=False):
+        there = np.flatnonzero(elbow & (rng.random(len(shape)) < 0.65))
+        blob[there] = part(rng, ends[there], width[there], extents[there])
+    return np.concatenate([arm, *blobs], axis=1), moved
+
+
+def _round_elbows(rng: np.random.Generator, ends: Array, width: Array, _extents: Array) -> Array:
+    """Balls (n, W, 3) at the ends of forearms."""
+    radii = width[:, None] * rng.uniform(0.8, 1.25, ends.shape)
+    return np.asarray(_BALL.vertices[None] * radii[:, None, :] + ends[:, None])
+
+
+def _upper_arms(rng: np.random.Generator, ends: Array, width: Array, extents: Array) -> Array:
+    """Long ellipsoids (n, W, 3) from the ends of forearms, mostly away from the sensor."""
+    half = rng.uniform(0.3, 0.7, len(ends)) * extents
+    radii = np.stack([width * rng.uniform(0.8, 1.4, len(ends)), width * rng.uniform(0.8, 1.4, len(ends)), half], axis=1)
+    turn = _any_rotations(rng, len(ends))
+    turn *= np.where((turn[:, 2, 2] < 0.0) & (rng.random(len(ends)) < 0.8), -1.0, 1.0)[:, None, None]
+    middle = ends + turn[:, :, 2] * (0.9 * half)[:, None]
+    return np.asarray((_BALL.vertices[None] * radii[:, None, :]) @ turn.transpose(0, 2, 1) + middle[:, None])
 
 
 def _forearms(
-    rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], poses: Array, orientations: Array
-) -> Array:
+    rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], poses: Array, orientations: Array,
+    long: NDArray[np.bool_],
+) -> Array:  # fmt: skip
     """Tapered tubes (n, W, 3) from inside the wrist, bent at it, short or long, with or without a sleeve."""
     n = len(shape)
     size = shapes.lengths[shape]
@@ -135,7 +165,7 @@ def _forearms(
         1, np.radians(rng.normal(0.0, 13.0, n))
     )
     along = np.linspace(0.0, 1.0, _RINGS)
-    length = np.where(rng.random(n) < 0.85, rng.uniform(0.9, 1.6, n), rng.uniform(0.05, 0.9, n)) * size
+    length = np.where(long | (rng.random(n) < 0.85), rng.uniform(0.9, 1.6, n), rng.uniform(0.05, 0.9, n)) * size
     growth = rng.uniform(0.05, 0.75, n)[:, None] * np.minimum(along * length[:, None] / size[:, None], 1.0)
     sleeve = (along > rng.uniform(0.05, 1.0, (n, 1))) * np.where(rng.random(n) < 0.3, rng.uniform(0.0, 0.6, n), 0.0)[
         :, None

@@ -1,5 +1,6 @@
 """A narrow page: what is needed now stays in sight."""
 
+from app.look import TABS
 from tests.app.test_browser import ARTEFACTS, button, page
 from tests.app.test_browser import pytestmark as pytestmark
 
@@ -22,3 +23,14 @@ def test_cancel_stays_in_sight_however_narrow_and_scrolled_the_page_is(page):
         assert 0 <= box["y"] < box["y"] + box["height"] <= height
     cancel.click()
     cancel.wait_for(state="hidden")
+
+
+def test_every_tab_is_in_sight_on_a_narrow_page(page):
+    for width in (1024, 820, 640):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(500)
+        page.screenshot(path=ARTEFACTS / f"tabs-{width}.png")
+        for name in TABS:
+            box = button(page, name).bounding_box()
+            assert box["x"] >= 0
+            assert box["x"] + box["width"] <= width

@@ -45,10 +45,23 @@ def test_batches_are_well_formed(generator):
     limits = load_hand("right").limits[list(ARTICULATED)]
     assert (batch.angles >= limits[:, 0] - 1e-6).all()
     assert (batch.angles <= limits[:, 1] + 1e-6).all()
-    assert 0.85 < batch.present.mean() < 0.98
+    assert 0.75 < batch.present.mean() < 0.95
     assert 0.7 < batch.right.mean() < 0.9
     usual = -np.log(EXTENT_PER_LENGTH)
     assert np.abs(batch.log_sizes - usual).max() < 0.6
+
+
+def test_around_an_elbow_there_is_no_hand_and_something_is_seen():
+    scenes = draw_scenes(np.random.default_rng(3), 400, make_shapes(SHAPES, 1), left_share=0.0)
+    kernel, elbow = scenes.kernel, scenes.kernel.drawn & ~scenes.present
+    assert 20 < elbow.sum() < 60
+    assert not scenes.present[~kernel.drawn].any()
+    middle = np.stack([np.zeros(400), np.zeros(400), kernel.away], axis=1)
+    apart = np.linalg.norm(kernel.poses[:, :3] - middle, axis=1) / kernel.extents
+    assert apart[elbow].min() > 0.5
+    assert apart[scenes.present].max() < 0.6
+    nearest = np.linalg.norm(kernel.others - middle[:, None], axis=2).min(axis=1) / kernel.extents
+    assert nearest[elbow].max() < 0.4
 
 
 def test_joints_lie_under_the_skin_that_the_crop_shows():
