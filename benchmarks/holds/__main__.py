@@ -64,7 +64,12 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=0, help="number of the first of them (0)")
     parser.add_argument("--frames", type=int, help="frames of a session (120; recordings whole)")
     parser.add_argument(
-        "--recording", nargs="*", default=[], metavar="FOLDER[,CAMERA.json]", help="recordings beside them"
+        "--recording",
+        nargs="*",
+        action="extend",
+        default=[],
+        metavar="FOLDER[,CAMERA.json]",
+        help="recordings beside them",
     )
     parser.add_argument("--seeds", type=int, help="seeds of each recording (5)")
     parser.add_argument("--n", type=int, nargs="+", default=[4, 8], help="numbers of particles (4 8)")

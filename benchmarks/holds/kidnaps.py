@@ -27,7 +27,7 @@ from spf.evaluate.contradictions import CONTRADICTED, label_energy
 from spf.evaluate.floor import floor_of
 from spf.filters.step import start_at
 from spf.frame import Camera, Frame
-from spf.hand.kinematics import joints_of
+from spf.hand.kinematics import joints_of, relative_to_camera
 from spf.hand.model import Hand
 from spf.lens import seen_through
 from spf.prepare import SessionFrames, prepare
@@ -45,6 +45,7 @@ _HELD_MM, _HELD_FRAMES = 20.0, 3  # above the floor, and for so long, counts as 
 _NOTICED, _RECOVERED = 5, 10  # frames: the bars
 _USUAL = ("medium", "body", "table", "second_hand")
 _MARGIN = 0.06  # m around the palm that has to stay in the view
+_SKIN = 0.02  # m of hand around a joint
 _SEEN = 0.4  # of the pixels that the hand was seen in before, at least
 _WAYS = (1.0, 1.0, 0.5)  # a jump goes less along the line of sight than across it
 _CHECKED = 4  # frames after the jump, spread, in which it must be
@@ -79,7 +80,12 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=0, help="number of the first synthetic session of each kind (0)")
     parser.add_argument("--kinds", nargs="*", default=list(_USUAL), choices=list(KINDS), metavar="KIND")
     parser.add_argument(
-        "--recording", nargs="*", default=[], metavar="FOLDER", help="recordings with truth beside them"
+        "--recording",
+        nargs="*",
+        action="extend",
+        default=[],
+        metavar="FOLDER",
+        help="recordings with truth beside them",
     )
     parser.add_argument("--json", type=Path, metavar="PATH")
     options = parser.parse_args(arguments)
@@ -105,7 +111,7 @@ def kidnapped(session: SyntheticSession, at: int, rng: np.random.Generator) -> S
         stage = session.stage._replace(trajectory=trajectory._replace(poses=poses, orientations=orientations))
         made = dataclasses.replace(session, stage=stage)
         after = np.linspace(at, len(made) - 1, _CHECKED).astype(int)
-        if all(made.hand_mask(int(index)).sum() > _SEEN * seen for index in after):
+        if _before_the_background(made, at) and all(made.hand_mask(int(index)).sum() > _SEEN * seen for index in after):
             return made  # neither behind what else is in the scene, nor in it, nor seen end on
     raise ValueError(f"The hand of {session.name} cannot jump anywhere without leaving the view.")
 
@@ -114,6 +120,18 @@ def _in_view(camera: Camera, palms: Array) -> bool:
     corners = np.array([[x, y, 0.0] for x in (-_MARGIN, _MARGIN) for y in (-_MARGIN, _MARGIN)])
     pixels = camera.project(palms[:, None] + corners)
     return bool((pixels >= 0.0).all() and (pixels < (camera.width, camera.height)).all())
+
+
+def _before_the_background(session: SyntheticSession, first: int) -> bool:
+    """Whether the hand is nowhere in a table or a wall, from a frame on."""
+    trajectory, background = session.stage.trajectory, session.stage.clutter.background
+    for pose, orientation in zip(trajectory.poses[first:], trajectory.orientations[first:], strict=True):
+        joints = joints_of(session.hand, pose, orientation)
+        u, v = np.round(session.camera.project(joints)).astype(int).T
+        inside = (u >= 0) & (v >= 0) & (u < session.camera.width) & (v < session.camera.height)
+        if (joints[inside, 2] + _SKIN > background[v[inside], u[inside]]).any():
+            return False
+    return True
 
 
 def _direction(rng: np.random.Generator, weights: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Array:
@@ -169,7 +187,10 @@ def _recorded(path: str, count: int) -> list[dict[str, Any]]:
         elsewhere = start_at(
             tracking.hand, pose, reference, float(session.times[at - 1]), len(state.filter.particles.poses)
         )
-        state = state._replace(filter=elsewhere, fresh=False, history=(start.golden,) * 10, golden=start.golden)
+        state = state._replace(
+            filter=elsewhere, fresh=False, history=(start.golden,) * 10, golden=start.golden,
+            held=relative_to_camera(pose, reference),
+        )  # fmt: skip
         told = {"kind": source.kind, "number": turn, "session": session.name, "at": int(at), "shows": ""}
         rows.append(told | _followed(session, tracking, state, SessionFrames(session, at, at + _AFTER), labelled))
     return rows

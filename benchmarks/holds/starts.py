@@ -73,7 +73,12 @@ def _parse(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--first", type=int, default=0, help="number of the first synthetic session of each kind (0)")
     parser.add_argument("--kinds", nargs="*", default=list(_USUAL), choices=list(KINDS), metavar="KIND")
     parser.add_argument(
-        "--recording", nargs="*", default=[], metavar="FOLDER", help="recordings with truth beside them"
+        "--recording",
+        nargs="*",
+        action="extend",
+        default=[],
+        metavar="FOLDER",
+        help="recordings with truth beside them",
     )
     parser.add_argument("--json", type=Path, metavar="PATH")
     options = parser.parse_args(arguments)

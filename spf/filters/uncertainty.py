@@ -34,7 +34,7 @@ __all__ = ["INFLATION", "Uncertainty", "uncertainty_of"]
 Array = NDArray[np.float64]
 
 #: Factor on the covariance, fitted by ``python -m benchmarks.holds.calibration``; see docs/evaluation.md.
-INFLATION = 0.46
+INFLATION = 0.37
 
 
 class Uncertainty(NamedTuple):

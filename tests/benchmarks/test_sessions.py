@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.holds.kidnaps import kidnapped
 from benchmarks.holds.sessions import KINDS, SENSORS, SHAPES, recordings, session_settings, synthetic
+from spf.segmentation import find_plane
 from spf.synthetic import MOTIONS, synthesise
 from spf.synthetic import SENSORS as ALL_SENSORS
 
@@ -63,3 +64,11 @@ def test_a_kidnapped_hand_jumps_and_turns_once_and_stays_in_view():
     np.testing.assert_allclose(angles, 150.0)
     np.testing.assert_array_equal(after.poses[:, 6:], before.poses[:, 6:])
     assert other.hand_mask(6).sum() > 0.4 * session.hand_mask(5).sum()
+
+
+def test_a_kidnapped_hand_is_not_put_into_a_table():
+    for number in (116, 408):  # with the first jump that is in the view it would be
+        session = kidnapped(synthesise(session_settings("table", number, 30)), 15, np.random.default_rng([number, 11]))
+        plane = find_plane(session[0])
+        for index in range(15, 30, 3):
+            assert (session[index].truth.joints @ plane[:3] + plane[3]).min() > 0.005
