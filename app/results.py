@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.frame import Frame
+from app.budget import SHARED, Budget
+from spf.frame import Camera, Frame
 from spf.optimisers.trajectory import Trajectory
 from spf.progress import Report
 from spf.sessions import Session
@@ -19,7 +20,6 @@ from spf.trackfile import TrackRow, row_of
 __all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules"]
 
 KEYFRAME = 10  # every so many frames, the state is kept for good
-MEMORY = 128 * 2**20  # bytes of entries that one lane of a page keeps
 
 
 class Entry(NamedTuple):
@@ -45,14 +45,28 @@ class Seen(NamedTuple):
 
     Attributes:
         top, left: corner of the mask in the depth image.
-        mask: (h, w) pixels that were taken for the hand.
-        points: (M, 3) m, the hand's observed points.
+        camera: of the part of the image under the mask.
+        packed: the mask, a bit a pixel.
+        depths: (M,) m, of the pixels under the mask.
     """
 
     top: int
     left: int
-    mask: NDArray[np.bool_]
-    points: NDArray[np.float32]
+    camera: Camera
+    packed: NDArray[np.uint8]
+    depths: NDArray[np.float32]
+
+    @property
+    def mask(self) -> NDArray[np.bool_]:
+        """The pixels (h, w) that were taken for the hand."""
+        height, width = self.camera.height, self.camera.width
+        return np.unpackbits(self.packed, count=height * width).reshape(height, width).astype(bool)
+
+    @property
+    def points(self) -> NDArray[np.float32]:
+        """The hand's observed points (M, 3), m."""
+        v, u = np.nonzero(self.mask)
+        return self.camera.back_project(u, v, self.depths).astype(np.float32)
 
 
 class Summary(NamedTuple):
@@ -91,8 +105,8 @@ class Summary(NamedTuple):
 class Results:
     """The frames tracked in one run, consecutive from its first; oldest entries are forgotten before memory grows."""
 
-    def __init__(self, memory: int = MEMORY) -> None:
-        self._memory = memory
+    def __init__(self, budget: Budget = SHARED) -> None:
+        self._budget = budget
         self._entries: dict[int, Entry] = {}
         self._sizes: dict[int, int] = {}
         self._summaries: dict[int, Summary] = {}
@@ -131,9 +145,20 @@ class Results:
         self._entries.pop(index, None)
         self._entries[index] = entry
         self._sizes[index] = _bytes(entry)
-        while sum(self._sizes.values()) > self._memory and len(self._entries) > 1:
-            oldest = next(iter(self._entries))
-            del self._entries[oldest], self._sizes[oldest]
+        self._budget.keep_within(self)
+
+    @property
+    def kept_bytes(self) -> int:
+        """Bytes of what is kept of frames for the views."""
+        return sum(self._sizes.values())
+
+    def forget_oldest(self) -> bool:
+        """Forget what is kept of a frame for the views, its summary and row excepted; not of the only one that there is."""
+        if len(self._entries) < 2:
+            return False
+        oldest = next(iter(self._entries))
+        del self._entries[oldest], self._sizes[oldest]
+        return True
 
     def remeasure(self, frame: Frame) -> None:
         """Compare a tracked frame with its truth anew: somebody has marked joints in it."""
@@ -150,7 +175,7 @@ class Results:
 
     def copy(self) -> Results:
         """Return results that grow apart from these from now on."""
-        other = Results(self._memory)
+        other = Results(self._budget)
         other._summaries, other._rows, other._states = dict(self._summaries), dict(self._rows), dict(self._states)
         other._entries, other._sizes = dict(self._entries), dict(self._sizes)
         return other
@@ -222,8 +247,9 @@ def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before
         info = info._replace(trajectories=tuple(_light(trace) for trace in info.trajectories))
     seen = None
     if observation is not None:
-        points = observation.hand_points.astype(np.float32)
-        seen = Seen(observation.top, observation.left, observation.depth > 0, points)
+        mask = observation.depth > 0
+        depths = observation.depth[mask]
+        seen = Seen(observation.top, observation.left, observation.camera, np.packbits(mask), depths)
     return Entry(result._replace(info=info, observation=None), state, tracking, seen, before)
 
 

@@ -2,8 +2,8 @@
 
 Serves the dashboard and drives Chromium through it in three parts: pages that all step, for minutes; pages that are opened,
 stepped and closed one after the other; and one page that tracks hundreds of frames while another one steps. Printed are the
-memory of the server and of its renderer, how long pages took from a press on Step to the new frame, how long the server alone
-took to answer (browsers need most of a small machine), and every error in the server's log.
+memory of the server, of its renderer and of the browser, how long pages took from a press on Step to the new frame, how long
+the server alone took to answer (browsers need most of a small machine), and every error in the server's log.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import threading
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -102,16 +102,26 @@ class Server(NamedTuple):
     probe: Probe
 
     def memory(self) -> dict[str, float]:
-        """Memory of the server and of its renderer, MB."""
+        """Memory of the server and of its renderer, and what the browser's processes have for themselves, MB."""
         renderers = [child for child in self.process.children() if "spf.render.worker" in child.cmdline()]
         return {
             "server_mb": self.process.memory_info().rss / 1e6,
             "renderer_mb": sum(child.memory_info().rss for child in renderers) / 1e6,
+            "browser_mb": _browser_bytes() / 1e6,
         }
 
     def errors(self) -> list[str]:
         """Lines of the log that tell of an error."""
         return [line for line in self.log.read_text().splitlines() if TROUBLE.search(line)]
+
+
+def _browser_bytes() -> int:
+    """Memory that nothing else shares, of all processes of the browser; those that end meanwhile have none."""
+    total = 0
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.NoSuchProcess):
+            total += child.memory_full_info().uss if "chrom" in child.name() else 0
+    return total
 
 
 @contextmanager

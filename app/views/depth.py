@@ -110,6 +110,7 @@ def _rgb(css: str) -> Colour:
 
 def _region(frame: Frame, seen: Seen) -> NDArray[np.bool_]:
     region = np.zeros(frame.depth.shape, bool)
-    height, width = seen.mask.shape
-    region[seen.top : seen.top + height, seen.left : seen.left + width] = seen.mask
+    mask = seen.mask
+    height, width = mask.shape
+    region[seen.top : seen.top + height, seen.left : seen.left + width] = mask
     return region

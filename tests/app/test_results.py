@@ -1,10 +1,15 @@
 """What a run keeps: bounded memory, losses, errors where there is truth."""
 
+import gc
+
 import numpy as np
 import pytest
 
-from app.results import Entry, Results, joint_error
+from app.budget import Budget
+from app.results import Entry, Results, entry_of, joint_error
 from spf.frame import Camera, Frame, Truth
+from spf.observation import observe
+from spf.synthetic import SyntheticSettings, synthesise
 from spf.track import TrackedFrame
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 2.0, 1.5)
@@ -23,7 +28,7 @@ def entry(index, *, lost=False, size=10):
 
 
 def test_old_entries_go_before_memory_grows_and_their_summaries_stay():
-    results = Results(memory=200_000)
+    results = Results(Budget(200_000))
     for index in range(50):
         results.add(entry(index, size=1000), frame(index))
     kept = [index for index in range(50) if results.entry(index) is not None]
@@ -53,3 +58,32 @@ def test_joint_error_is_over_the_known_joints():
     joints[:2] = [[0.003, 0.0, 0.004], [0.0, 0.0, 0.015]]
     assert joint_error(np.zeros((21, 3)), frame(0, Truth(joints))) == pytest.approx(0.010)
     assert np.isnan(joint_error(np.zeros((21, 3)), frame(0)))
+
+
+def test_runs_share_their_memory_and_who_keeps_most_forgets_first():
+    budget = Budget(300_000)
+    short, long = Results(budget), Results(budget)
+    for index in range(5):
+        short.add(entry(index, size=1000), frame(index))
+    for index in range(50):
+        long.add(entry(index, size=1000), frame(index))
+    assert short.kept_bytes + long.kept_bytes <= 300_000
+    assert all(short.entry(index) is not None for index in range(5))
+    assert long.entry(0) is None
+    assert long.entry(49) is not None
+    del long
+    gc.collect()
+    for index in range(5, 30):
+        short.add(entry(index, size=1000), frame(index))
+    assert short.entry(5) is not None
+
+
+def test_what_was_seen_is_kept_small_and_whole():
+    session = synthesise(SyntheticSettings(frames=1))
+    truth = session[0].truth
+    observation = observe(session[0], truth.joints.mean(axis=0), 0.15)
+    result = entry(0).result._replace(observation=observation)
+    seen = entry_of(result, (), None, ()).seen
+    np.testing.assert_array_equal(seen.mask, observation.depth > 0)
+    np.testing.assert_allclose(seen.points, observation.hand_points, atol=1e-6)
+    assert seen.packed.nbytes + seen.depths.nbytes < 0.4 * observation.hand_points.astype(np.float32).nbytes
