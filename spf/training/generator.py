@@ -58,7 +58,7 @@ class Generator:
         self.seed = seed
         self.table = make_shapes(shapes, seed) if isinstance(shapes, int) else shapes
         hand = self.table.arrays
-        faces = np.concatenate([hand.faces, other_faces(len(hand.skin.vertices))])
+        faces = np.concatenate([hand.faces, other_faces(hand.faces, len(hand.skin.vertices))])
         self._arrays = hand._replace(faces=faces)
         rng = np.random.default_rng([seed, 2])
         self._pools = Pools(rng.standard_normal(_POOL, dtype=np.float32), rng.random(_POOL, dtype=np.float32))

@@ -1,4 +1,4 @@
-"""Draw scenes at random: where the hand is and how it is turned, its forearm, other things, and the sensor.
+"""Draw scenes at random: where the hand is and how it is turned, its forearm, the other hand, other things, and the sensor.
 
 Every scene is laid out in the frame of its crop's camera, with the cube's centre at (0, 0, away).
 """
@@ -17,7 +17,7 @@ from spf.learned.layout import CROP_SIZE, EXTENT_PER_LENGTH
 from spf.synthetic.solids import ellipsoid, tube
 from spf.synthetic.trajectory import PALM_TO_SENSOR
 from spf.training.articulations import draw_articulations
-from spf.training.shapes import ShapeTable
+from spf.training.shapes import MIRRORED, ShapeTable
 
 __all__ = ["Scenes", "draw_scenes", "other_faces"]
 
@@ -27,6 +27,7 @@ _HAND_MIDDLE = np.array([-0.005, -0.005, -0.035])  # m, middle of the joints of 
 _RINGS, _BLOBS = 10, 3
 _EMPTY_SHARE = 0.05
 _ELBOW_SHARE = 0.1  # of the other scenes
+_SECOND_SHARE = 0.2  # of those in which the hand is seen: the other one is near, or its arm
 _POOL = 1 << 22
 _ABSENT = -1.0  # coordinates of what is not drawn: behind the camera
 
@@ -51,11 +52,18 @@ class Scenes(NamedTuple):
     present: NDArray[np.bool_]
 
 
-def other_faces(first: int) -> NDArray[np.int32]:
-    """Return the faces of the forearm and the blobs, whose vertices begin at a number."""
-    counts = np.cumsum([first, len(_TUBE.vertices), *([len(_BALL.vertices)] * _BLOBS)])
+def other_faces(hand: NDArray[np.int32], first: int) -> NDArray[np.int32]:
+    """Return the faces of all that is no hand to be found, whose vertices begin at a number: arms, blobs and the other hand.
+
+    Args:
+        hand: (F, 3) faces of a hand with ``first`` vertices.
+        first: number of the first vertex.
+    """
+    parts = [(_TUBE.faces, len(_TUBE.vertices)), *[(_BALL.faces, len(_BALL.vertices))] * _BLOBS]
+    parts += [(_TUBE.faces, len(_TUBE.vertices)), (hand, first)]
+    starts = np.cumsum([first, *(count for _, count in parts)])
     return np.concatenate(
-        [_TUBE.faces + counts[0], *(_BALL.faces + start for start in counts[1:-1])], dtype=np.int32, casting="unsafe"
+        [faces + start for (faces, _), start in zip(parts, starts, strict=False)], dtype=np.int32, casting="unsafe"
     )
 
 
@@ -75,6 +83,8 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
     poses[:, :3] = middles - np.einsum("nij,nj->ni", orientations, size[:, None] * _HAND_MIDDLE)
     others, moved = _others(rng, shapes, shape, poses, orientations, away, extents, empty, elbow)
     poses[:, :3] += moved
+    second = ~(empty | elbow) & (rng.random(n) < _SECOND_SHARE)
+    others = np.concatenate([others, _second_hands(rng, shapes, second, middles, away, extents)], axis=1)
     focal = np.exp(rng.uniform(np.log(0.75), np.log(2.1), n)) * CROP_SIZE * away / extents
     sizes = np.minimum(np.ceil(focal * extents / away * 1.03) + 4, LARGEST_PICTURE).astype(np.int64)
     kernel = SampleScenes(
@@ -124,7 +134,7 @@ def _others(
     away: Array, extents: Array, empty: NDArray[np.bool_], elbow: NDArray[np.bool_],
 ) -> tuple[Array, Array]:  # fmt: skip
     """Vertices (n, W, 3) of forearm and blobs, and how far (n, 3) all hands are moved so that some elbows are in the middle."""
-    arm = _forearms(rng, shapes, shape, poses, orientations, elbow)
+    arm = _forearms(rng, shapes, shape, poses[:, :3], orientations, elbow)
     centres = np.stack([np.zeros_like(away), np.zeros_like(away), away], axis=1)
     ends = centres + rng.normal(0.0, 0.08, arm[:, -1].shape) * extents[:, None]
     moved = np.where(elbow[:, None], ends - arm[:, -1], 0.0)
@@ -136,6 +146,29 @@ def _others(
         there = np.flatnonzero(elbow & (rng.random(len(shape)) < 0.65))
         blob[there] = part(rng, ends[there], width[there], extents[there])
     return np.concatenate([arm, *blobs], axis=1), moved
+
+
+def _second_hands(
+    rng: np.random.Generator, shapes: ShapeTable, there: NDArray[np.bool_], middles: Array, away: Array, extents: Array
+) -> Array:
+    """Vertices (n, W, 3) of left hands and their forearms, farther from the middle of the cube than the hand to be found."""
+    n = len(there)
+    shape = rng.integers(len(shapes.sizes), size=n)
+    direction = rng.normal(size=(n, 3)) * (1.0, 1.0, 0.6)
+    direction[:, 2] = np.abs(direction[:, 2]) * np.where(rng.random(n) < 0.7, 1.0, -1.0)
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    seconds = middles + direction * (rng.uniform(0.28, 0.9, n) * extents)[:, None]
+    centres = np.stack([np.zeros(n), np.zeros(n), away], axis=1)
+    apart = np.linalg.norm(seconds - centres, axis=1) - np.linalg.norm(middles - centres, axis=1)
+    mirror = np.diag(MIRRORED)
+    orientations = mirror @ _orientations(rng, n) @ mirror
+    middle_of = shapes.sizes[shape][:, None] * (_HAND_MIDDLE * MIRRORED)
+    palms = seconds - np.einsum("nij,nj->ni", orientations, middle_of)
+    skins = shapes.left[shape] @ orientations.transpose(0, 2, 1) + palms[:, None]
+    arms = _forearms(rng, shapes, shape, palms, orientations, np.ones(n, bool))
+    placed = np.concatenate([arms, skins], axis=1)
+    placed[~there | (apart < 0.1 * extents)] = _ABSENT
+    return placed
 
 
 def _round_elbows(rng: np.random.Generator, ends: Array, width: Array, _extents: Array) -> Array:
@@ -155,7 +188,7 @@ def _upper_arms(rng: np.random.Generator, ends: Array, width: Array, extents: Ar
 
 
 def _forearms(
-    rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], poses: Array, orientations: Array,
+    rng: np.random.Generator, shapes: ShapeTable, shape: NDArray[np.int64], palms: Array, orientations: Array,
     long: NDArray[np.bool_],
 ) -> Array:  # fmt: skip
     """Tapered tubes (n, W, 3) from inside the wrist, bent at it, short or long, with or without a sleeve."""
@@ -177,7 +210,7 @@ def _forearms(
     local[..., :2] = _TUBE.vertices[None, :, :2] * radii[:, ring]
     local[..., 2] = along[ring] * length[:, None] - 0.02 * size[:, None]
     turn = orientations @ bend
-    start = poses[:, :3] + np.einsum("nij,nj->ni", orientations, shapes.wrist_middles[shape])
+    start = palms + np.einsum("nij,nj->ni", orientations, shapes.wrist_middles[shape])
     return np.asarray(local @ turn.transpose(0, 2, 1) + start[:, None, :])
 
 

@@ -7,14 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.hand.kinematics import joints_of
+from spf.hand.kinematics import joints_of, pose_hand
 from spf.hand.model import Hand, load_hand
 from spf.hand.shape import HandShape
 from spf.kernels.samples import ShapeArrays
+from spf.training.articulations import draw_articulations
 
-__all__ = ["ShapeTable", "make_shapes", "size_of"]
+__all__ = ["MIRRORED", "ShapeTable", "make_shapes", "size_of"]
 
 Array = NDArray[np.float64]
+
+MIRRORED = np.array([-1.0, 1.0, 1.0])  # takes a right hand to a left one, in a picture as in a palm's frame
 
 
 class ShapeTable(NamedTuple):
@@ -27,6 +30,7 @@ class ShapeTable(NamedTuple):
         wrists: (K, 3) m, the wrist in the model's frame.
         wrist_radii: (K, 2) m, half width and half thickness of the wrist.
         wrist_middles: (K, 3) m, middle of the wrist's section in the model's frame.
+        left: (K, V, 3) m, skins of left hands of these shapes, each posed in some way, in their palms' frames.
     """
 
     arrays: ShapeArrays
@@ -35,6 +39,7 @@ class ShapeTable(NamedTuple):
     wrists: Array
     wrist_radii: Array
     wrist_middles: Array
+    left: Array
 
 
 def size_of(hand: Hand) -> float:
@@ -82,7 +87,17 @@ def make_shapes(count: int, seed: int) -> ShapeTable:
         np.array([hand.skeleton.bind[0, :, 3] for hand in hands]),
         np.array([radii for radii, _ in sections]),
         np.array([middle for _, middle in sections]),
+        np.array(
+            [_mirrored_skin(hand, angles) for hand, angles in zip(hands, draw_articulations(rng, count), strict=True)]
+        ),
     )
+
+
+def _mirrored_skin(hand: Hand, angles: Array) -> Array:
+    """Skin (V, 3) of the left hand whose mirror image is a right one, m, in the palm's frame."""
+    pose = hand.neutral_pose()
+    pose[:3], pose[6:] = 0.0, angles
+    return pose_hand(hand, pose, np.eye(3)).vertices * MIRRORED
 
 
 def _wrist_section(hand: Hand) -> tuple[Array, Array]:

@@ -64,6 +64,20 @@ def test_around_an_elbow_there_is_no_hand_and_something_is_seen():
     assert nearest[elbow].max() < 0.4
 
 
+def test_the_other_hand_is_farther_from_the_middle_than_the_one_to_be_found():
+    table = make_shapes(SHAPES, 1)
+    scenes = draw_scenes(np.random.default_rng(3), 400, table, left_share=0.0)
+    kernel = scenes.kernel
+    skins = kernel.others[:, -table.left.shape[1] :]
+    second = skins[..., 2].max(axis=1) > 0.0
+    assert 30 < second.sum() < 90
+    assert not second[~scenes.present].any()
+    middle = np.stack([np.zeros(400), np.zeros(400), kernel.away], axis=1)
+    own = kernel.poses[:, :3] + np.einsum("nij,j->ni", kernel.orientations, np.array([-0.005, -0.005, -0.035]))
+    apart = [np.linalg.norm(at - middle, axis=1) / kernel.extents for at in (skins.mean(axis=1), own)]
+    assert (apart[0] - apart[1])[second].min() > 0.0
+
+
 def test_joints_lie_under_the_skin_that_the_crop_shows():
     """Without noise and other things, a joint's pixel shows skin, which is not far behind it and mostly in front."""
     table = make_shapes(SHAPES, 1)
@@ -75,7 +89,7 @@ def test_joints_lie_under_the_skin_that_the_crop_shows():
         faults=np.tile([NO_FAULTS[name] for name in FAULTS], (200, 1)),
     )
     arrays = table.arrays._replace(
-        faces=np.concatenate([table.arrays.faces, other_faces(len(table.arrays.skin.vertices))])
+        faces=np.concatenate([table.arrays.faces, other_faces(table.arrays.faces, len(table.arrays.skin.vertices))])
     )
     pools = Pools(np.zeros(1024, np.float32), np.full(1024, 0.5, np.float32))
     crops, joints = np.empty((200, CROP_SIZE, CROP_SIZE), np.float32), np.empty((200, 21, 3))
