@@ -26,7 +26,7 @@ from spf.errors import SpfError
 from spf.evaluate.contradictions import CONTRADICTED, label_energy
 from spf.evaluate.floor import floor_of
 from spf.filters.step import start_at
-from spf.frame import Camera, Frame
+from spf.frame import Frame
 from spf.hand.kinematics import joints_of, relative_to_camera
 from spf.hand.model import Hand
 from spf.lens import seen_through
@@ -44,9 +44,8 @@ _BEFORE, _AFTER = 15, 15  # frames before the kidnap, for the tracker to know th
 _HELD_MM, _HELD_FRAMES = 20.0, 3  # above the floor, and for so long, counts as held
 _NOTICED, _RECOVERED = 5, 10  # frames: the bars
 _USUAL = ("medium", "body", "table", "second_hand")
-_MARGIN = 0.06  # m around the palm that has to stay in the view
 _SKIN = 0.02  # m of hand around a joint
-_SEEN = 0.4  # of the pixels that the hand was seen in before, at least
+_SEEN = 0.4  # of the pixels in which the sensor saw the hand before, at least
 _WAYS = (1.0, 1.0, 0.5)  # a jump goes less along the line of sight than across it
 _CHECKED = 4  # frames after the jump, spread, in which it must be
 _DRAWS = 500
@@ -101,35 +100,35 @@ def kidnapped(session: SyntheticSession, at: int, rng: np.random.Generator) -> S
         ValueError: there is no room in the view.
     """
     trajectory = session.stage.trajectory
-    seen = session.hand_mask(at - 1).sum()
+    seen = _pixels(session, at - 1)
     for _ in range(_DRAWS):
         poses, orientations = trajectory.poses.copy(), trajectory.orientations.copy()
         poses[at:, :3] += _direction(rng, _WAYS) * _JUMP
         orientations[at:] = Rotation.from_rotvec(_direction(rng) * _TURN).as_matrix() @ orientations[at:]
-        if not _in_view(session.camera, poses[at:, :3]):
-            continue
         stage = session.stage._replace(trajectory=trajectory._replace(poses=poses, orientations=orientations))
         made = dataclasses.replace(session, stage=stage)
         after = np.linspace(at, len(made) - 1, _CHECKED).astype(int)
-        if _before_the_background(made, at) and all(made.hand_mask(int(index)).sum() > _SEEN * seen for index in after):
-            return made  # neither behind what else is in the scene, nor in it, nor seen end on
+        if _is_clear(made, at) and all(_pixels(made, int(index)) > _SEEN * seen for index in after):
+            return made  # neither out of the view, nor in what else is in the scene, nor behind it, nor seen end on
     raise ValueError(f"The hand of {session.name} cannot jump anywhere without leaving the view.")
 
 
-def _in_view(camera: Camera, palms: Array) -> bool:
-    corners = np.array([[x, y, 0.0] for x in (-_MARGIN, _MARGIN) for y in (-_MARGIN, _MARGIN)])
-    pixels = camera.project(palms[:, None] + corners)
-    return bool((pixels >= 0.0).all() and (pixels < (camera.width, camera.height)).all())
+def _pixels(session: SyntheticSession, index: int) -> int:
+    """Count the pixels in which the sensor sees the hand."""
+    return int((session.hand_mask(index) & (session[index].depth > 0.0)).sum())
 
 
-def _before_the_background(session: SyntheticSession, first: int) -> bool:
-    """Whether the hand is nowhere in a table or a wall, from a frame on."""
+def _is_clear(session: SyntheticSession, first: int) -> bool:
+    """Whether the whole hand is in the view, and nowhere in a table or a wall, from a frame on."""
     trajectory, background = session.stage.trajectory, session.stage.clutter.background
     for pose, orientation in zip(trajectory.poses[first:], trajectory.orientations[first:], strict=True):
         joints = joints_of(session.hand, pose, orientation)
+        if joints[:, 2].min() < _SKIN:
+            return False
         u, v = np.round(session.camera.project(joints)).astype(int).T
-        inside = (u >= 0) & (v >= 0) & (u < session.camera.width) & (v < session.camera.height)
-        if (joints[inside, 2] + _SKIN > background[v[inside], u[inside]]).any():
+        if min(u.min(), v.min()) < 0 or u.max() >= session.camera.width or v.max() >= session.camera.height:
+            return False
+        if (joints[:, 2] + _SKIN > background[v, u]).any():
             return False
     return True
 

@@ -66,6 +66,18 @@ def test_a_kidnapped_hand_jumps_and_turns_once_and_stays_in_view():
     assert other.hand_mask(6).sum() > 0.4 * session.hand_mask(5).sum()
 
 
+def test_a_kidnapped_hand_is_wholly_in_the_view_and_the_sensor_sees_it():
+    for kind, number in (("table", 417), ("second_hand", 410)):  # half out of the view, and nearer than the sensor sees
+        session = synthesise(session_settings(kind, number, 30))
+        other = kidnapped(session, 15, np.random.default_rng([number, 11]))
+        for index in range(15, 30):
+            u, v = other.camera.project(other[index].truth.joints).T
+            assert 0.0 < u.min() < u.max() < other.camera.width
+            assert 0.0 < v.min() < v.max() < other.camera.height
+        seen = [(one.hand_mask(index) & (one[index].depth > 0.0)).sum() for one, index in ((session, 14), (other, 15))]
+        assert seen[1] > 0.4 * seen[0]
+
+
 def test_a_kidnapped_hand_is_not_put_into_a_table():
     for number in (116, 408):  # with the first jump that is in the view it would be
         session = kidnapped(synthesise(session_settings("table", number, 30)), 15, np.random.default_rng([number, 11]))
