@@ -11,16 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.results import Entry
+from app.results import Entry, seen_again
 from app.state import State
 from spf.cost.settings import CostSettings
 from spf.errors import SpfError
 from spf.filters.reweigh import SEEN_AT_ONCE, landscape, reweigh
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of
-from spf.lens import seen_through
-from spf.locate import reach_of
-from spf.observation import Observation, observe
+from spf.observation import Observation
 from spf.settings import Settings
 
 __all__ = ["Landscape", "Preview", "Previewer"]
@@ -128,7 +126,7 @@ class Previewer:
 
     def _weighed(self, job: _Job, frame: Frame) -> tuple[Preview, Observation]:
         if self._observed is None or self._observed[0] is not job.base:
-            self._observed = job.base, _seen_again(job.base, frame)
+            self._observed = job.base, seen_again(job.base, frame)
         return _preview(job, self._observed[1]), self._observed[1]
 
 
@@ -137,13 +135,6 @@ class _Job(NamedTuple):
     settings: Settings
     tracker: str
     entries: tuple[int, int]
-
-
-def _seen_again(base: Entry, frame: Frame) -> Observation:
-    """What was looked at."""
-    how, place = base.tracking, base.result.place
-    assert place is not None
-    return observe(seen_through(frame, how.start.shape.lens), place, reach_of(how.hand))
 
 
 def _preview(job: _Job, observation: Observation) -> Preview:

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from app.budget import SHARED, Budget
 from spf.frame import Camera, Frame
+from spf.lens import seen_through
+from spf.locate import reach_of
+from spf.observation import Observation, observe
 from spf.optimisers.trajectory import Trajectory
 from spf.progress import Report
 from spf.sessions import Session
@@ -17,7 +20,7 @@ from spf.settings import Settings
 from spf.track import TrackedFrame, Tracking, TrackState
 from spf.trackfile import TrackRow, row_of
 
-__all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules"]
+__all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules", "seen_again"]
 
 KEYFRAME = 10  # every so many frames, the state is kept for good
 
@@ -251,6 +254,13 @@ def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before
         depths = observation.depth[mask]
         seen = Seen(observation.top, observation.left, observation.camera, np.packbits(mask), depths)
     return Entry(result._replace(info=info, observation=None), state, tracking, seen, before)
+
+
+def seen_again(entry: Entry, frame: Frame) -> Observation:
+    """Return what was looked at in a tracked frame."""
+    how, place = entry.tracking, entry.result.place
+    assert place is not None
+    return observe(seen_through(frame, how.start.shape.lens), place, reach_of(how.hand))
 
 
 def _light(trace: Trajectory) -> Trajectory:

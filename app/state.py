@@ -102,6 +102,7 @@ class State(param.Parameterized):
 
     dark: bool = param.Boolean(False, doc="whether the page is dark")
     with_truth: bool = param.Boolean(True, doc="whether the truth is drawn too")
+    with_spread: bool = param.Boolean(False, doc="whether it is drawn how far off each joint may be")
     azimuth: float = param.Number(0.0)
     elevation: float = param.Number(0.0)
     zoom: float = param.Number(1.0)

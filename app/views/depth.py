@@ -10,16 +10,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.results import Seen
+from app.results import Entry, Seen, seen_again
 from app.state import State
 from app.views.picture import Picture
 from app.views.three_d import ThreeD
 from spf.errors import SessionError
+from spf.filters.smart import SpfSettings
+from spf.filters.uncertainty import reach_of_share, uncertainty_of
 from spf.frame import Frame
+from spf.lens import as_stated
 from spf.render import Skeleton, depth_picture
 from spf.render.palette import PREDICTED
 
-__all__ = ["Depth", "depth_jpeg"]
+__all__ = ["SHARE", "Depth", "around_joints", "depth_jpeg"]
+
+SHARE = 0.9  # of the joints that are within what is drawn around them
 
 Colour = tuple[int, ...]  # RGB, 0 to 255
 _WIDTH, _QUICK_WIDTH = 736, 368  # pixels: twice what it takes in the page, and once while playing
@@ -43,7 +48,7 @@ class Depth:
         self.pane = Picture(
             hint="Choose a session to see its depth images.", alt="Depth image", sizing_mode="stretch_both", margin=0
         )
-        state.param.watch(self.draw, ["session", "revision", "with_truth", "playing"])
+        state.param.watch(self.draw, ["session", "revision", "with_truth", "with_spread", "playing"])
         state.look.param.watch(self.draw, "tab")
 
     def draw(self, *_events: Any) -> None:
@@ -67,10 +72,11 @@ class Depth:
     def _work(self) -> Callable[[], bytes]:
         """What there is to draw, fixed as it is now."""
         state = self._state
-        session, index, with_truth = state.session, state.frame, state.with_truth
+        session, index, with_truth, entry = state.session, state.frame, state.with_truth, state.entry
         assert session is not None
         width = _QUICK_WIDTH if state.playing else _WIDTH
-        seen = state.entry.seen if state.entry is not None else None
+        seen = entry.seen if entry is not None else None
+        spread = entry if state.with_spread and self._mode == "one" else None
         shown = [(lane.colour, lane.summary(index)) for lane in state.active]
         estimates = [
             Skeleton(summary.joints, _rgb(colour) if self._mode == "compare" else _ESTIMATE)
@@ -81,9 +87,24 @@ class Depth:
         def work() -> bytes:
             frame = session[index]
             truth = [Skeleton(frame.truth.joints, _TRUTH)] if with_truth and frame.truth is not None else []
-            return depth_jpeg(frame, seen, [*truth, *estimates], width)
+            around = None if spread is None else around_joints(spread, frame)
+            return depth_jpeg(frame, seen, [*truth, *(one._replace(around=around) for one in estimates)], width)
 
         return work
+
+
+def around_joints(entry: Entry, frame: Frame) -> NDArray[np.float64] | None:
+    """Return the matrices (21, 3, 3), m², whose ellipses in the picture hold nine in ten of the joints.
+
+    None where the hand is lost, and of a tracker whose uncertainty is not known.
+    """
+    info, tracking = entry.result.info, entry.tracking
+    if info is None or not isinstance(tracking.settings, SpfSettings):
+        return None
+    said = uncertainty_of(tracking.hand, seen_again(entry, frame), info, tracking.settings)
+    lens = tracking.start.shape.lens
+    stated = np.diag(as_stated(np.ones(3), lens))
+    return np.asarray(reach_of_share(SHARE, 2) ** 2 * (stated @ said.joints @ stated))
 
 
 def depth_jpeg(

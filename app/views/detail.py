@@ -12,7 +12,7 @@ from app.look import TABS
 from app.state import State
 from app.views.costs import Costs
 from app.views.curves import ERROR, ESS, Curves
-from app.views.depth import Depth
+from app.views.depth import SHARE, Depth
 from app.views.fit import Fit
 from app.views.grid import card, cards
 from app.views.parts import Parts
@@ -100,10 +100,18 @@ class Overview:
         over: list[Any] = [Curves(state, ERROR), Curves(state, ESS), Fit(state)]
         self.panel = cards(
             *(card(self.pictures.panes[name], heading(title), _PICTURE_HEIGHT) for name, title in PICTURES.items()),
-            card(depth.pane, heading("Depth", *keys), _PICTURE_HEIGHT, truth_switch(state)),
+            card(depth.pane, heading("Depth", *keys), _PICTURE_HEIGHT, _spread_switch(state), truth_switch(state)),
             *(card(plot.pane, plot.heading, _PICTURE_HEIGHT) for plot in now),
             *(card(plot.pane, plot.heading, _PLOT_HEIGHT) for plot in over),
         )
+
+
+def _spread_switch(state: State) -> pmu.Switch:
+    """Return the switch that shows or hides how far off each joint may be."""
+    return pmu.Switch.from_param(
+        state.param.with_spread, label=f"± {100 * SHARE:.0f} %", size="small", margin=(0, 4), align="center",
+        description="Around each joint of the estimate of the Smart Particle Filter: nine in ten are within.",
+    )  # fmt: skip
 
 
 def truth_switch(state: State) -> pmu.Switch:

@@ -1,8 +1,8 @@
-"""Is the uncertainty honest: ``uv run python -m benchmarks.holds.calibration [--sessions 4] [--json PATH]``.
+"""Is the uncertainty honest: ``uv run python -m benchmarks.holds.calibration [--sessions 8] [--json PATH]``.
 
 Sessions are tracked from an automatic start, and each true joint is looked for in the ellipsoids that should hold it with
-probability 0.1 to 0.99. The one factor on the covariance is the one with which half of them hold half of the joints; it is fitted
-on sessions of even numbers and judged on those of odd ones. See docs/evaluation.md.
+probability 0.1 to 0.99. The factor on the covariance and the degrees of freedom of the errors' distribution are the most likely
+ones of sessions of even numbers, and are judged on those of odd ones. See docs/evaluation.md.
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, spearmanr
+from scipy.optimize import minimize
+from scipy.stats import f as f_distribution
+from scipy.stats import spearmanr
 
 from benchmarks.holds.layout import markdown, stamp
 from benchmarks.holds.sessions import KINDS, Source, open_source, synthetic
 from spf.errors import SpfError
 from spf.filters.smart import SpfSettings
-from spf.filters.uncertainty import uncertainty_of
+from spf.filters.uncertainty import reach_of_share, uncertainty_of
 from spf.initialise import find_start
 from spf.prepare import SessionFrames
 from spf.track import begin, track_frame
 
-__all__ = ["LEVELS", "coverage", "fitted_factor", "main"]
+__all__ = ["LEVELS", "coverage", "fitted", "main"]
 
 Array = NDArray[np.float64]
 LEVELS = (0.1, 0.25, 0.5, 0.68, 0.8, 0.9, 0.95, 0.99)
@@ -37,10 +39,10 @@ _USUAL = ("slow", "medium", "fast", "back")
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Track, fit the factor, print how often the truth lies where it should, and write the JSON."""
+    """Track, fit, print how often the truth lies where it should, and write the JSON."""
     parser = argparse.ArgumentParser(prog="benchmarks.holds.calibration", description="Is the uncertainty honest.")
     parser.add_argument("--kinds", nargs="+", default=list(_USUAL), choices=list(KINDS), metavar="KIND")
-    parser.add_argument("--sessions", type=int, default=4, help="sessions of each kind, half of them to fit on (4)")
+    parser.add_argument("--sessions", type=int, default=8, help="sessions of each kind, half of them to fit on (8)")
     parser.add_argument("--first", type=int, default=0, help="number of the first of them (0)")
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--n", type=int, default=4, help="particles (4)")
@@ -54,7 +56,7 @@ def main(arguments: list[str] | None = None) -> None:
                 print(f"  {kind} {source.number}: {len(rows)} frames", file=sys.stderr, flush=True)
     except SpfError as error:
         sys.exit(f"calibration: {error}")
-    for parity, use in enumerate(("fit the factor on", "judge it by")):
+    for parity, use in enumerate(("fit on", "judge by")):
         if not any(row["number"] % 2 == parity for row in _held(rows)):
             sys.exit(f"calibration: in no session to {use} was the hand held; ask for more sessions.")
     result = _summary(rows)
@@ -94,14 +96,25 @@ def _squared(errors: Array, covariances: Array) -> Array:
     return np.asarray(np.einsum("ji,ji->j", errors, np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]))
 
 
-def fitted_factor(squared: Array) -> float:
-    """Return the factor on the covariance with which half of the ellipsoids of probability ½ hold the truth."""
-    return float(np.median(squared) / chi2.ppf(0.5, df=3))
+def fitted(squared: Array) -> tuple[float, float]:
+    """Return the factor on the covariance and the degrees of freedom (more than 2) that are the most likely ones.
+
+    Args:
+        squared: (M,) squared Mahalanobis distances of errors in three dimensions, by the covariances with a factor of 1.
+    """
+
+    def unlikely(logs: Array) -> float:
+        scale, tails = np.exp(logs[0]), 2.0 + np.exp(logs[1])  # squared / (3 scale) is of F(3, tails)
+        return -float(f_distribution.logpdf(squared / (3.0 * scale), 3, tails).mean() - logs[0])
+
+    log_scale, log_excess = minimize(unlikely, np.zeros(2), method="Nelder-Mead").x
+    tails = 2.0 + float(np.exp(log_excess))
+    return float(np.exp(log_scale)) * tails / (tails - 2.0), tails
 
 
-def coverage(squared: Array, factor: float) -> list[float]:
+def coverage(squared: Array, factor: float, tails: float) -> list[float]:
     """Return how often the truth lies within the ellipsoid of each of :data:`LEVELS`."""
-    return [float(np.mean(squared <= factor * chi2.ppf(level, df=3))) for level in LEVELS]
+    return [float(np.mean(squared <= factor * reach_of_share(level, 3, tails) ** 2)) for level in LEVELS]
 
 
 def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -109,13 +122,13 @@ def _summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     held = _held(rows)
     even = [row for row in held if row["number"] % 2 == 0]
     odd = [row for row in held if row["number"] % 2 == 1]
-    factor = fitted_factor(_all(even, "squared"))
+    factor, tails = fitted(_all(even, "squared"))
     parts = {"fitted on": even, "judged on": odd}
     parts |= {kind: [row for row in odd if row["kind"] == kind] for kind in dict.fromkeys(row["kind"] for row in odd)}
     return {
-        "factor": factor, "gross_frames": len(rows) - len(held), "held_frames": len(held),
+        "factor": factor, "tails": tails, "gross_frames": len(rows) - len(held), "held_frames": len(held),
         "ms": 1e3 * float(np.median([row["seconds"] for row in rows])),
-        "parts": {name: _part(own, factor) for name, own in parts.items() if own},
+        "parts": {name: _part(own, factor, tails) for name, own in parts.items() if own},
     }  # fmt: skip
 
 
@@ -123,12 +136,12 @@ def _held(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [row for row in rows if np.mean(row["error_mm"]) < _HELD_MM]
 
 
-def _part(rows: list[dict[str, Any]], factor: float) -> dict[str, Any]:
+def _part(rows: list[dict[str, Any]], factor: float, tails: float) -> dict[str, Any]:
     errors, deviations = _all(rows, "error_mm"), _all(rows, "deviation_mm") * np.sqrt(factor)
     thirds = np.quantile(deviations, [1 / 3, 2 / 3])
     surest, least = deviations <= thirds[0], deviations > thirds[1]
     return {
-        "frames": len(rows), "coverage": coverage(_all(rows, "squared"), factor),
+        "frames": len(rows), "coverage": coverage(_all(rows, "squared"), factor, tails),
         "rms_error_mm": _rms(errors), "rms_deviation_mm": _rms(deviations),
         "rank_correlation": float(spearmanr(deviations, errors).statistic),
         "surest_third_mm": float(errors[surest].mean()), "least_sure_third_mm": float(errors[least].mean()),
@@ -153,8 +166,9 @@ def _table(result: dict[str, Any]) -> str:
         ends = [f"{part[key]:.1f}" for key in ("surest_third_mm", "least_sure_third_mm")]
         cells.append([name, str(part["frames"]), *shares, *numbers, f"{part['rank_correlation']:.2f}", *ends])
     return (
-        f"{markdown(cells)}\n\nfactor on the covariance {result['factor']:.2f}; {result['gross_frames']} frames over "
-        f"{_HELD_MM:.0f} mm left out, {result['held_frames']} held; {result['ms']:.1f} ms a frame"
+        f"{markdown(cells)}\n\nfactor on the covariance {result['factor']:.2f}, degrees of freedom {result['tails']:.1f}; "
+        f"{result['gross_frames']} frames over {_HELD_MM:.0f} mm left out, {result['held_frames']} held; "
+        f"{result['ms']:.1f} ms a frame"
     )
 
 

@@ -7,8 +7,13 @@ With few particles one sample carries nearly all the weight, so that the second 
 
 H is the Gauss-Newton Hessian (22) at the estimate ŝ, σ² that of the likelihood (6), and q the process noise: what the depth
 does not see is known as well as the dynamics predict it over one frame. Left out are the rendered comparison, the calibration of
-the hand, and minima that no particle is in; one factor, fitted to synthetic sessions with exact truth, stands for these on the
-average, and does not make the estimate of a hand that is held wrongly uncertain.
+the hand, and minima that no particle is in. Two numbers, fitted to synthetic sessions with exact truth, stand for these: a
+factor on the covariance, and the degrees of freedom of Student's t, for some sessions and fingers are far more wrong than most:
+
+    error ~ t_ν with covariance Σ: a share p of the errors in d dimensions is within r of the estimate by Σ⁻¹, where
+    r² = d (ν − 2)/ν · F⁻¹_{d,ν}(p)
+
+They do not make the estimate of a hand that is held wrongly uncertain.
 
 Nothing of this is computed in a step: it is asked for, of a frame's info, by whoever shows it.
 """
@@ -19,6 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import f as f_distribution
 
 from spf.cost.problem import make_problem
 from spf.cost.products import gauss_newton, see
@@ -29,12 +35,13 @@ from spf.hand.kinematics import joint_jacobian
 from spf.hand.model import Hand
 from spf.observation import Observation
 
-__all__ = ["INFLATION", "Uncertainty", "uncertainty_of"]
+__all__ = ["INFLATION", "TAILS", "Uncertainty", "reach_of_share", "uncertainty_of"]
 
 Array = NDArray[np.float64]
 
-#: Factor on the covariance, fitted by ``python -m benchmarks.holds.calibration``; see docs/evaluation.md.
-INFLATION = 0.37
+#: Factor on the covariance, and degrees of freedom of the errors' distribution (more than 2; the fewer, the heavier its tails),
+#: fitted by ``python -m benchmarks.holds.calibration``; see docs/evaluation.md.
+INFLATION, TAILS = 0.5, 3.6
 
 
 class Uncertainty(NamedTuple):
@@ -72,3 +79,14 @@ def uncertainty_of(
     jacobian = joint_jacobian(hand, info.estimate, info.reference)
     joints = np.einsum("jai,ik,jbk->jab", jacobian, pose, jacobian)
     return Uncertainty(pose, joints, np.sqrt(np.trace(joints, axis1=1, axis2=2)))
+
+
+def reach_of_share(share: float, dimensions: int = 3, tails: float = TAILS) -> float:
+    """Return the r within which a share of the errors is: ``√(eᵀ Σ⁻¹ e) ≤ r`` for errors e and covariance Σ.
+
+    Args:
+        share: 0 to 1.
+        dimensions: of an error: 3 in space, 2 in a picture.
+        tails: degrees of freedom ν, more than 2.
+    """
+    return float(np.sqrt(dimensions * (tails - 2.0) / tails * f_distribution.ppf(share, dimensions, tails)))

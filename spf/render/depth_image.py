@@ -26,10 +26,17 @@ _GREY = ((70 + 60 * np.linspace(0, 1, 256))[:, None, None] * (0.94, 1.0, 1.08)).
 
 
 class Skeleton(NamedTuple):
-    """Joints (21, 3) in metres, NaN where unknown, and the colour (RGB, 0 to 255) that they are drawn in."""
+    """A hand's skeleton.
+
+    Attributes:
+        joints: (21, 3) m, NaN where unknown.
+        colour: RGB, 0 to 255, that it is drawn in.
+        around: (21, 3, 3) m², of each joint A with ``eᵀ A⁻¹ e = 1`` drawn around it, in the picture; None for none.
+    """
 
     joints: NDArray[np.float64]
     colour: Colour
+    around: NDArray[np.float64] | None = None
 
 
 class Box(NamedTuple):
@@ -132,6 +139,9 @@ def _draw(canvas: NDArray[np.uint8], camera: Camera, skeleton: Skeleton, box: Bo
     pixels = np.zeros((len(joints), 2))
     pixels[known] = (camera.project(joints[known]) - [box.left, box.top] + 0.5) * scale - 0.5
     at = np.rint(pixels.clip(-1e4, 1e4) * 2**_FRACTION).astype(int)
+    if skeleton.around is not None:
+        for joint in np.flatnonzero(known):
+            _draw_around(canvas, camera, joints[joint], skeleton.around[joint], at[joint], scale, skeleton.colour)
     for paint, width, radius in ((_OUTLINE, 5, 6), (skeleton.colour, 2, 4)):
         for first, last in _BONES:
             if known[first] and known[last]:
@@ -139,3 +149,17 @@ def _draw(canvas: NDArray[np.uint8], camera: Camera, skeleton: Skeleton, box: Bo
                 cv2.line(canvas, *ends, paint, width, cv2.LINE_AA, _FRACTION)
         for joint in np.flatnonzero(known):
             cv2.circle(canvas, tuple(map(int, at[joint])), radius << _FRACTION, paint, -1, cv2.LINE_AA, _FRACTION)
+
+
+def _draw_around(
+    canvas: NDArray[np.uint8], camera: Camera, joint: NDArray[np.float64], around: NDArray[np.float64],
+    at: NDArray[np.int_], scale: float, colour: Colour,
+) -> None:  # fmt: skip
+    """Draw the ellipse of a joint's matrix around its place ``at`` in the picture, which is in fractions of a pixel."""
+    steps = 1e-4 * np.eye(3)
+    slopes = (camera.project(joint + steps) - camera.project(joint - steps)).T / 2e-4  # (2, 3) pixels a metre
+    variances, axes = np.linalg.eigh(slopes @ around @ slopes.T)
+    half = tuple(int(length * scale * 2**_FRACTION) for length in np.sqrt(variances[::-1].clip(0.0, 1e8)))
+    angle = float(np.degrees(np.arctan2(axes[1, 1], axes[0, 1])))
+    for paint, width in ((_OUTLINE, 3), (colour, 1)):
+        cv2.ellipse(canvas, tuple(map(int, at)), half, angle, 0.0, 360.0, paint, width, cv2.LINE_AA, _FRACTION)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import app.work
-from app.views.depth import depth_jpeg
+from app.views.depth import around_joints, depth_jpeg
 from app.views.scenes import SCENES, view_of
-from spf.render import Skeleton, ViewCamera
+from spf.frame import JOINT_NAMES
+from spf.render import Skeleton, ViewCamera, depth_picture
 
 
 def started(state, controller, sample, act):
@@ -214,3 +215,19 @@ def test_play_in_a_loop_stays_within_the_range(page, sample, act):
     act(controller.play)
     assert shown == [2, 3, 1, 2, 3, 1, 2]  # it began at 1
     assert state.lane.results.last == 4
+
+
+def test_around_each_joint_stands_how_far_off_it_may_be(page, sample, act):
+    state, controller = page
+    started(state, controller, sample, act)
+    frame = state.session[0]
+    around = around_joints(state.entry, frame)
+    assert around.shape == (21, 3, 3)
+    reach = np.sqrt(np.linalg.eigvalsh(around)[:, -1])
+    assert (reach > 1e-4).all()
+    assert reach[JOINT_NAMES.index("middle_tip")] > reach[JOINT_NAMES.index("middle_mcp")]
+    bare = Skeleton(state.summary.joints, (255, 255, 255))
+    without, with_them = (depth_picture(frame, None, [one]) for one in (bare, bare._replace(around=around)))
+    assert (without != with_them).any()
+    lost = state.entry._replace(result=state.entry.result._replace(info=None))
+    assert around_joints(lost, frame) is None

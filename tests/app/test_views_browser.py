@@ -43,6 +43,21 @@ def shot(page, name):
     page.screenshot(path=ARTEFACTS / f"{name}.png")
 
 
+def test_a_switch_shows_how_far_off_each_joint_may_be(page):
+    start_from_truth(page)
+    depth = page.locator(".picture-frame").filter(has=page.get_by_alt_text("Depth image", exact=True))
+    settled(page)
+    without = depth.screenshot()
+    page.get_by_label("± 90 %").filter(visible=True).click()
+    page.mouse.move(5, 5)
+    for _ in range(40):
+        page.wait_for_timeout(250)
+        if depth.screenshot() != without:
+            break
+    assert depth.screenshot() != without
+    shot(page, "spread")
+
+
 def test_particles_are_seen_in_any_two_entries_and_picked(page):
     start_from_truth(page)
     for index in (1, 2):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.holds.calibration import LEVELS, coverage, fitted_factor
+from benchmarks.holds.calibration import LEVELS, coverage, fitted
 from benchmarks.holds.table import bar_of, lay_out, row_of, worst
 
 
@@ -87,9 +87,12 @@ def test_the_worst_runs_come_first_and_say_where():
     assert "frames 3-4" in lines[0] or "WRONG SIDE" in lines[0]
 
 
-def test_coverage_of_gaussian_errors_is_what_it_says(rng):
-    squared = 2.5 * (rng.normal(size=(200_000, 3)) ** 2).sum(axis=1)
-    factor = fitted_factor(squared)
-    assert factor == pytest.approx(2.5, rel=0.02)
-    assert coverage(squared, factor) == pytest.approx(list(LEVELS), abs=0.005)
-    assert coverage(squared, factor / 4)[LEVELS.index(0.9)] < 0.6
+def test_coverage_of_errors_is_what_it_says_however_heavy_their_tails(rng):
+    normal = (rng.normal(size=(200_000, 3)) ** 2).sum(axis=1)
+    for covariance, tails in ((2.5, 4.0), (0.3, 30.0)):
+        squared = covariance * (tails - 2.0) / tails * normal / (rng.chisquare(tails, size=200_000) / tails)
+        factor, found = fitted(squared)
+        assert factor == pytest.approx(covariance, rel=0.1)
+        assert found == pytest.approx(tails, rel=0.15)
+        assert coverage(squared, factor, found) == pytest.approx(list(LEVELS), abs=0.005)
+        assert coverage(squared, factor / 4, found)[LEVELS.index(0.9)] < 0.75
