@@ -88,7 +88,8 @@ def hypotheses_of(
                     sized = shape or HandShape(side, scale=scale)
                     posed = sized.hand()
                     charge = strangeness(network, frame, posed, pose, np.eye(3))
-                    found.append(Hypothesis(sized, pose, energy + charge, unfamiliarity(network, frame, posed, pose)))
+                    unfamiliar = unfamiliarity(network, frame, posed, pose, told=len(sides) == 1)
+                    found.append(Hypothesis(sized, pose, energy + charge, unfamiliar))
             if _least(found) < _GOOD_PLACE:
                 break
         result += _different(sorted(found, key=lambda h: h.charged), _PER_SIDE)

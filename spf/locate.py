@@ -210,11 +210,12 @@ def strangeness(network: Network | None, frame: Frame, hand: Hand, pose: Array, 
     return strangeness_to(seen, hand, joints_of(hand, pose, reference))
 
 
-def unfamiliarity(network: Network | None, frame: Frame, hand: Hand, pose: Array) -> float:
+def unfamiliarity(network: Network | None, frame: Frame, hand: Hand, pose: Array, *, told: bool = False) -> float:
     """Golden energy that a place is charged for not looking like a hand to the network, however one is held; 0 without it.
 
     By how sure it is of joints around the hand of a pose (D,) relative to the camera's axes, of either side. The end of an
     arm or an elbow is rendered as well as a hand; but where the fingers of what is no hand are, the network does not know.
+    Where the side of the hand is ``told``, a place at which the network sees a hand of the other one is charged for that.
     """
     if network is None:
         return 0.0
@@ -222,7 +223,11 @@ def unfamiliarity(network: Network | None, frame: Frame, hand: Hand, pose: Array
     sureness = [
         -3.0 * float(np.log(_spread(guess) / (guess.scale * load_hand(guess.side).length)).mean()) for guess in seen
     ]
-    return _STRANGE * max(_SURE - max(sureness), 0.0)
+    unsure = _STRANGE * max(_SURE - max(sureness), 0.0)
+    if not told:
+        return unsure
+    shares = np.exp([guess.log_weight for guess in seen])
+    return unsure + _ABSENT * float(shares[[guess.side != hand.side for guess in seen]].sum() / shares.sum())
 
 
 def seen_at(

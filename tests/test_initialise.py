@@ -23,6 +23,16 @@ def test_a_hand_on_a_long_arm_is_not_looked_for_in_the_elbow(kind, number, first
     assert np.linalg.norm(found - frames[0].truth.joints, axis=1).mean() < 0.04
 
 
+@pytest.mark.parametrize(("number", "side"), [(3, "right"), (3, "left"), (203, "left")])
+def test_of_two_hands_in_view_the_one_of_the_stated_side_is_meant(number, side):
+    session = open_source(synthetic("second_hand", number, 1, 6)[0])
+    second, moves = session.stage.clutter.second
+    start = find_start(SessionFrames(session, 0, 6), np.random.default_rng(0), side=side)
+    poses = moves.poses if second.side == side else session.stage.trajectory.poses
+    assert start.shape.side == side
+    assert np.linalg.norm(start.pose[:3] - poses[start.frame, :3]) < 0.02
+
+
 def test_sizes_that_are_too_large_and_too_small_end_in_the_true_one():
     session = synthesise(SyntheticSettings(motion="count", sensor="realsense", frames=40, shape="standard", seed=2))
     for wrong in (0.94, 1.07):
