@@ -10,8 +10,9 @@ import pytest
 from app.address import Address, Place, place_of
 from app.controller import Controller
 from app.lane import Lane
-from app.preview import Previewer, _seen_again
+from app.preview import Previewer
 from app.reruns import Reruns
+from app.results import seen_again
 from app.runner import Runner
 from app.server import bundled, open_shared
 from app.shelf import Shelf
@@ -77,7 +78,7 @@ def test_the_frame_is_seen_again_through_the_lens_that_it_was_tracked_through(pa
     start = base.tracking.start
     through = base.tracking._replace(start=start._replace(shape=start.shape._replace(lens=1.3)))
     for tracking, lens in ((base.tracking, 1.0), (through, 1.3)):
-        assert _seen_again(base._replace(tracking=tracking), frame).camera.fx == pytest.approx(lens * frame.camera.fx)
+        assert seen_again(base._replace(tracking=tracking), frame).camera.fx == pytest.approx(lens * frame.camera.fx)
 
 
 def test_what_cannot_be_seen_at_once_is_said(page, sample):
