@@ -136,8 +136,7 @@ class Posing(param.Parameterized):
     def _place(self, placed: Placed, told: str = "") -> None:
         if self.placed is not None:
             self._remember(self.placed)
-        self.param.update(placed=placed, compared=None, told=told)
-        self.judge()
+        self.param.update(placed=placed, compared=None, told=told, explained=self._explained(placed))
 
     def _remember(self, placed: Placed) -> None:
         self._undo.append(placed)
@@ -145,8 +144,10 @@ class Posing(param.Parameterized):
 
     def judge(self) -> None:
         """Say how well the hand explains the frame shown."""
-        placed = self.placed
-        self.explained = None if placed is None else explained(self.frame(), placed.shape, placed.stance)
+        self.explained = None if self.placed is None else self._explained(self.placed)
+
+    def _explained(self, placed: Placed) -> Explained | None:
+        return explained(self.frame(), placed.shape, placed.stance)
 
     @property
     def can_undo(self) -> bool:
@@ -156,8 +157,8 @@ class Posing(param.Parameterized):
     def undo(self) -> None:
         """Take the last drag, slider, fit or change of shape back."""
         if self._undo:
-            self.param.update(placed=self._undo.pop(), compared=None, told="Taken back.")
-            self.judge()
+            placed = self._undo.pop()
+            self.param.update(placed=placed, compared=None, told="Taken back.", explained=self._explained(placed))
 
     def begin_drag(self) -> None:
         """A drag begins with the hand as it is."""

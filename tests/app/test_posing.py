@@ -14,6 +14,7 @@ from app.views.start_card import StartCard
 from spf.cli import execute
 from spf.hand import read_hand_shape, read_pose
 from spf.hand.kinematics import joints_of
+from spf.posing import explained
 
 
 @pytest.fixture
@@ -49,6 +50,22 @@ def test_a_drag_is_one_step_back(posing):
     drag(posing, "thumb_tip", 0, 0)
     posing.push(0.01)
     assert posing.placed.stance.pose[2] == pytest.approx(before.stance.pose[2] + 0.01)
+
+
+def test_what_is_told_of_a_hand_is_of_that_hand(posing, act):
+    told = {}
+
+    def note(*_events):
+        placed = posing.placed
+        told[posing.told] = posing.explained == explained(posing.frame(), placed.shape, placed.stance)
+
+    posing.param.watch(note, "told")
+    act(posing.fit)
+    drag(posing, "palm", 20, -10)
+    posing.judge()
+    posing.undo()
+    assert told["Fitted to this frame."]
+    assert told["Taken back."]
 
 
 def test_a_hand_dragged_away_is_fitted_back(posing, act):
