@@ -95,13 +95,15 @@ def test_a_hand_is_posed_fitted_and_tracked_from(page, shelf, tmp_path):  # noqa
     fitted = overlap(page)
     assert fitted > 75
     picture_of(page, "fitted")
+    begun = {"palm": middle(page, "palm")}
     drag(page, "palm", -40, 24, within=3)
+    begun["middle_tip"] = middle(page, "middle_tip")
     drag(page, "middle_tip", 0, 50, within=6)
     until(page, lambda: overlap(page) < fitted - 10)
     picture_of(page, "dragged")
-    for _ in range(2):
+    for handle in ("middle_tip", "palm"):
         button(page, "Undo pose").click()
-        page.wait_for_timeout(600)
+        until(page, lambda handle=handle: np.abs(middle(page, handle) - begun[handle]).max() < 1)
     until(page, lambda: overlap(page) == fitted)
     button(page, "Index").click()
     slider = page.get_by_role("slider", name=re.compile("Index PIP flexion"))
