@@ -17,13 +17,12 @@ from numpy.typing import NDArray
 
 from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import PosedHand
-from spf.hand.model import Hand
+from spf.hand.model import MIRROR, Hand
 
 __all__ = ["MODEL", "corrected_joints", "definitions", "offsets_of", "relative_offsets"]
 
 Array = NDArray[np.float64]
 MODEL = "model"  # the project's own definition, which needs no correction
-_MIRROR = np.array([-1.0, 1.0, 1.0])
 
 
 @cache
@@ -58,13 +57,13 @@ def corrected_joints(hand: Hand, posed: PosedHand, offsets: Array) -> Array:
         posed: its pose.
         offsets: (21, 3) from :func:`offsets_of`.
     """
-    mirror = _MIRROR if hand.side == "left" else np.ones(3)
+    mirror = MIRROR if hand.side == "left" else np.ones(3)
     rotations = posed.frames[hand.joint_bone][:, :, :3]
     return posed.joints + np.einsum("jik,jk->ji", rotations, offsets * mirror * hand.length)
 
 
 def relative_offsets(hand: Hand, posed: PosedHand, joints: Array) -> Array:
     """Return by how much given joints (21, 3) differ from the model's, in the units of :func:`offsets_of`."""
-    mirror = _MIRROR if hand.side == "left" else np.ones(3)
+    mirror = MIRROR if hand.side == "left" else np.ones(3)
     rotations = posed.frames[hand.joint_bone][:, :, :3]
     return np.asarray(np.einsum("jik,ji->jk", rotations, joints - posed.joints) * mirror / hand.length)

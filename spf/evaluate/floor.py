@@ -18,7 +18,7 @@ from spf.filters.dynamics import noise_scale
 from spf.filters.smart import SpfSettings
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of
-from spf.hand.model import Hand
+from spf.hand.model import MIRROR, Hand
 from spf.lens import as_stated, seen_through
 from spf.locate import reach_of
 from spf.observation import observe
@@ -54,7 +54,7 @@ def marked(hand: Hand, offsets: Array) -> Hand:
         hand: the calibrated hand.
         offsets: (21, 3) from :func:`spf.joint_definitions.offsets_of`.
     """
-    mirror = np.array([-1.0, 1.0, 1.0]) if hand.side == "left" else np.ones(3)
+    mirror = MIRROR if hand.side == "left" else np.ones(3)
     return hand._replace(joint_offset=hand.joint_offset + offsets * mirror * hand.length)
 
 

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as f_distribution
+from scipy.special import fdtri
 
 from spf.cost.problem import make_problem
 from spf.cost.products import gauss_newton, see
@@ -89,4 +89,4 @@ def reach_of_share(share: float, dimensions: int = 3, tails: float = TAILS) -> f
         dimensions: of an error: 3 in space, 2 in a picture.
         tails: degrees of freedom ν, more than 2.
     """
-    return float(np.sqrt(dimensions * (tails - 2.0) / tails * f_distribution.ppf(share, dimensions, tails)))
+    return float(np.sqrt(dimensions * (tails - 2.0) / tails * fdtri(dimensions, tails, share)))

@@ -32,9 +32,22 @@ from spf.hand.glb import SkinnedMesh, read_glb
 from spf.kernels.kinematics import Skeleton
 from spf.kernels.skinning import MOST_INFLUENCES, SHARE_COLUMNS, Skin
 
-__all__ = ["BONES", "DOF_NAMES", "FINGERS", "FREE_DIP_NAMES", "Hand", "load_hand", "mirrored", "vertex_normals"]
+__all__ = [
+    "BONES",
+    "DOF_NAMES",
+    "FINGERS",
+    "FREE_DIP_NAMES",
+    "MIRROR",
+    "Hand",
+    "load_hand",
+    "mirrored",
+    "vertex_normals",
+]
 
 Side = Literal["left", "right"]
+
+#: Factors on coordinates that take a right hand to a left one and back, in a hand's own frames as in a camera's.
+MIRROR = np.array([-1.0, 1.0, 1.0])
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
@@ -238,18 +251,17 @@ def assemble_hand(
 
 def mirrored(hand: Hand) -> Hand:
     """Return the exact mirror image of a hand: the other side, the same mesh reflected in its sagittal plane."""
-    mirror = np.array([-1.0, 1.0, 1.0])
     bind = hand.skeleton.bind.copy()
-    bind[:, :, 3] *= mirror
-    bind[:, :, :3] = mirror[:, None] * bind[:, :, :3] * mirror  # M R M is again a rotation
+    bind[:, :, 3] *= MIRROR
+    bind[:, :, :3] = MIRROR[:, None] * bind[:, :, :3] * MIRROR  # M R M is again a rotation
     return assemble_hand(
         "left" if hand.side == "right" else "right",
-        hand.skin.vertices * mirror,
+        hand.skin.vertices * MIRROR,
         np.ascontiguousarray(hand.faces[:, ::-1]),
         bone_weights(hand),
         bind,
         hand.joint_bone,
-        hand.joint_offset * mirror,
+        hand.joint_offset * MIRROR,
         free_dip=hand.dofs == len(DOF_NAMES) + len(FREE_DIP_NAMES),
     )
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from spf.frame import Camera
 from spf.hand.kinematics import joints_of_each
-from spf.hand.model import DOF_NAMES, Hand, Side, load_hand
+from spf.hand.model import DOF_NAMES, MIRROR, Hand, Side, load_hand
 from spf.learned import layout
 from spf.learned.crops import make_crops
 from spf.learned.network import Network
@@ -35,7 +35,6 @@ EXTENTS: tuple[float, ...] = (0.16, 0.22, 0.30, 0.41)
 _SCALES = (0.5, 2.0)  # of people's hands and what data sets make of them
 _SURENESS = 10.0  # nats by which joints that are sure to a fraction 1/e of the distance outweigh others
 _UNSURE_SIDE = 5.0  # nats, for the side, by a factor e of the joints' spread
-_MIRROR = np.array([-1.0, 1.0, 1.0])
 _SIDES: tuple[Side, Side] = ("right", "left")
 
 
@@ -182,7 +181,7 @@ def _points(predicted: Array, side: Side, cubes: Cubes) -> Array:
     """Return predicted points (M, H, 66) in the camera frame (M, H, 22, 3), m: pixel (u, v) of depth z shows (1 + z p)(u, v)."""
     points = predicted.reshape(*predicted.shape[:2], 22, 3).copy()
     points[..., :2] *= 1.0 + points[..., 2:] * cubes.perspectives[:, None, None, None]
-    points *= cubes.extents[:, None, None, None] * (_MIRROR if side == "left" else 1.0)
+    points *= cubes.extents[:, None, None, None] * (MIRROR if side == "left" else 1.0)
     return np.asarray(points @ cubes.turns.transpose(0, 2, 1)[:, None] + cubes.centres[:, None, None])
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from spf.frame import Camera
 from spf.hand.kinematics import PosedHand, pose_hand
-from spf.hand.model import Hand, load_hand
+from spf.hand.model import MIRROR, Hand, load_hand
 from spf.kernels.render import FAR
 from spf.synthetic.motions import MOTIONS
 from spf.synthetic.solids import Mesh, draw, ellipsoid, plane_depth, tube
@@ -116,7 +116,7 @@ def _second_hand(place: Place) -> Clutter:
     offset = np.array([beside * place.rng.uniform(0.19, 0.23), place.rng.uniform(-0.02, 0.05), 0.06])
     position = place.position + offset
     if other.side == "left":
-        position = position * (-1.0, 1.0, 1.0)  # written for a right hand, then mirrored
+        position = position * MIRROR  # written for a right hand, then mirrored
     view = View(position, *place.rng.normal(0.0, 0.2, 3))
     right = load_hand("right")
     moves = make_trajectory(right, MOTIONS["open_close"], view, place.frames, 3.0, place.fps, place.rng)

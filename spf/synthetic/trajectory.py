@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.hand.kinematics import joints_of, rotation_about
-from spf.hand.model import FINGERS, Hand
+from spf.hand.model import FINGERS, MIRROR, Hand
 from spf.synthetic.motions import Key, Motion
 
 __all__ = [
@@ -136,10 +136,9 @@ def joint_speed(hand: Hand, trajectory: Trajectory) -> float:
 
 def mirrored_trajectory(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory of the other hand, mirrored in the camera's plane x = 0."""
-    mirror = np.array([-1.0, 1.0, 1.0])
     poses = trajectory.poses.copy()
     poses[:, 0] *= -1.0
-    return Trajectory(poses, mirror[:, None] * trajectory.orientations * mirror)
+    return Trajectory(poses, MIRROR[:, None] * trajectory.orientations * MIRROR)
 
 
 def _first_key(source: Iterator[Key]) -> _Script:

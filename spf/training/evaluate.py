@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from spf.frame import Frame
 from spf.hand.kinematics import angles_of, joints_of, pose_hand
-from spf.hand.model import load_hand
+from spf.hand.model import MIRROR, load_hand
 from spf.joint_definitions import corrected_joints, offsets_of
 from spf.learned import layout
 from spf.learned.guesses import Cubes, Guess, decode, search_hand, side_evidence
@@ -78,7 +78,7 @@ def _sample_errors(batch: Batch, numbers: Array) -> dict[str, Array]:
     """Errors (N,) of samples whose numbers are of the crops in which their hands are right ones."""
     n, length = len(numbers), load_hand("right").length
     units = 1e3 * length * np.exp(-batch.log_sizes)  # sides of the cube to mm of the bundled hand
-    truths = batch.points * np.where(batch.right[:, None, None] > 0.5, 1.0, [-1.0, 1.0, 1.0])
+    truths = batch.points * np.where(batch.right[:, None, None] > 0.5, 1.0, MIRROR)
     cubes = Cubes(np.zeros((n, 3)), np.ones(n), np.tile(np.eye(3), (n, 1, 1)), batch.perspectives.astype(np.float64))
     rows = []
     for unit, truth, turn, log_size, group in zip(

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.hand.kinematics import rotations_about
+from spf.hand.model import MIRROR
 from spf.kernels.samples import LARGEST_PICTURE, SampleScenes
 from spf.kernels.sensing import FAULTS
 from spf.learned.layout import CROP_SIZE, EXTENT_PER_LENGTH
 from spf.synthetic.solids import ellipsoid, tube
 from spf.synthetic.trajectory import PALM_TO_SENSOR
 from spf.training.articulations import draw_articulations
-from spf.training.shapes import MIRRORED, ShapeTable
+from spf.training.shapes import ShapeTable
 
 __all__ = ["Scenes", "draw_scenes", "other_faces"]
 
@@ -80,7 +81,7 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
     elbow = ~empty & (rng.random(n) < _ELBOW_SHARE)
     poses = np.zeros((n, 26))
     poses[:, 6:] = draw_articulations(rng, n)
-    poses[:, :3] = middles - np.einsum("nij,nj->ni", orientations, size[:, None] * _HAND_MIDDLE)
+    poses[:, :3] = _palms(middles, orientations, size, _HAND_MIDDLE)
     others, moved = _others(rng, shapes, shape, poses, orientations, away, extents, empty, elbow)
     poses[:, :3] += moved
     second = ~(empty | elbow) & (rng.random(n) < _SECOND_SHARE)
@@ -102,6 +103,16 @@ def draw_scenes(rng: np.random.Generator, n: int, shapes: ShapeTable, left_share
         starts=rng.integers(_POOL, size=n),
     )
     return Scenes(kernel, rng.random(n) < left_share, ~(empty | elbow))
+
+
+def _centres(away: Array) -> Array:
+    """Centres (n, 3) of the cubes."""
+    return np.stack([np.zeros_like(away), np.zeros_like(away), away], axis=1)
+
+
+def _palms(middles: Array, orientations: Array, sizes: Array, middle: Array) -> Array:
+    """Palms (n, 3) of hands whose joints' middle, ``middle`` in the bundled hand's frame, is to be at ``middles``."""
+    return np.asarray(middles - np.einsum("nij,nj->ni", orientations, sizes[:, None] * middle))
 
 
 def _orientations(rng: np.random.Generator, n: int) -> Array:
@@ -135,7 +146,7 @@ def _others(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Vertices (n, W, 3) of forearm and blobs, and how far (n, 3) all hands are moved so that some elbows are in the middle."""
     arm = _forearms(rng, shapes, shape, poses[:, :3], orientations, elbow)
-    centres = np.stack([np.zeros_like(away), np.zeros_like(away), away], axis=1)
+    centres = _centres(away)
     ends = centres + rng.normal(0.0, 0.08, arm[:, -1].shape) * extents[:, None]
     moved = np.where(elbow[:, None], ends - arm[:, -1], 0.0)
     arm += moved[:, None]
@@ -154,20 +165,17 @@ def _second_hands(
     """Vertices (n, W, 3) of left hands and their forearms, farther from the middle of the cube than the hand to be found."""
     n = len(there)
     shape = rng.integers(len(shapes.sizes), size=n)
-    direction = rng.normal(size=(n, 3)) * (1.0, 1.0, 0.6)
-    direction[:, 2] = np.abs(direction[:, 2]) * np.where(rng.random(n) < 0.7, 1.0, -1.0)
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction = _directions(rng, n, behind=0.7, along=0.6)
     seconds = middles + direction * (rng.uniform(0.28, 0.9, n) * extents)[:, None]
-    centres = np.stack([np.zeros(n), np.zeros(n), away], axis=1)
+    centres = _centres(away)
     apart = np.linalg.norm(seconds - centres, axis=1) - np.linalg.norm(middles - centres, axis=1)
-    mirror = np.diag(MIRRORED)
-    orientations = mirror @ _orientations(rng, n) @ mirror
-    middle_of = shapes.sizes[shape][:, None] * (_HAND_MIDDLE * MIRRORED)
-    palms = seconds - np.einsum("nij,nj->ni", orientations, middle_of)
-    skins = shapes.left[shape] @ orientations.transpose(0, 2, 1) + palms[:, None]
+    orientations = MIRROR[:, None] * _orientations(rng, n) * MIRROR
+    palms = _palms(seconds, orientations, shapes.sizes[shape], _HAND_MIDDLE * MIRROR)
     arms = _forearms(rng, shapes, shape, palms, orientations, np.ones(n, bool))
-    placed = np.concatenate([arms, skins], axis=1)
-    placed[~there | (apart < 0.1 * extents)] = _ABSENT
+    shown = np.flatnonzero(there & (apart >= 0.1 * extents))
+    skins = shapes.left[shape[shown]] @ orientations[shown].transpose(0, 2, 1) + palms[shown, None]
+    placed = np.full((n, arms.shape[1] + skins.shape[1], 3), _ABSENT)
+    placed[shown] = np.concatenate([arms[shown], skins], axis=1)
     return placed
 
 
@@ -219,15 +227,20 @@ def _blobs(rng: np.random.Generator, centres: Array, extents: Array, share: Arra
     placed = np.full((len(extents), len(_BALL.vertices), 3), _ABSENT)
     there = np.flatnonzero(rng.random(len(extents)) < share)
     n, extent = len(there), extents[there]
-    direction = rng.normal(size=(n, 3))
-    direction[:, 2] = np.abs(direction[:, 2]) * np.where(rng.random(n) < 0.85, 1.0, -1.0)
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    direction = _directions(rng, n, behind=0.85)
     radii = np.exp(rng.uniform(np.log(0.06), np.log(0.5), (n, 3))) * extent[:, None]
     reach = (rng.uniform(0.3, 0.65, n) * extent)[:, None] + 0.6 * radii.mean(axis=1, keepdims=True)
     turn = _any_rotations(rng, n)
     middle = centres[there] + direction * reach
     placed[there] = (_BALL.vertices[None] * radii[:, None, :]) @ turn.transpose(0, 2, 1) + middle[:, None]
     return placed
+
+
+def _directions(rng: np.random.Generator, n: int, behind: float, along: float = 1.0) -> Array:
+    """Unit vectors (n, 3), a share of them away from the sensor, stretched by a factor along its line of sight."""
+    direction = rng.normal(size=(n, 3)) * (1.0, 1.0, along)
+    direction[:, 2] = np.abs(direction[:, 2]) * np.where(rng.random(n) < behind, 1.0, -1.0)
+    return np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))
 
 
 def _any_rotations(rng: np.random.Generator, n: int) -> Array:

@@ -8,16 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from spf.hand.kinematics import joints_of, pose_hand
-from spf.hand.model import Hand, load_hand
+from spf.hand.model import MIRROR, Hand, load_hand
 from spf.hand.shape import HandShape
 from spf.kernels.samples import ShapeArrays
 from spf.training.articulations import draw_articulations
 
-__all__ = ["MIRRORED", "ShapeTable", "make_shapes", "size_of"]
+__all__ = ["ShapeTable", "make_shapes", "size_of"]
 
 Array = NDArray[np.float64]
-
-MIRRORED = np.array([-1.0, 1.0, 1.0])  # takes a right hand to a left one, in a picture as in a palm's frame
 
 
 class ShapeTable(NamedTuple):
@@ -97,7 +95,7 @@ def _mirrored_skin(hand: Hand, angles: Array) -> Array:
     """Skin (V, 3) of the left hand whose mirror image is a right one, m, in the palm's frame."""
     pose = hand.neutral_pose()
     pose[:3], pose[6:] = 0.0, angles
-    return pose_hand(hand, pose, np.eye(3)).vertices * MIRRORED
+    return pose_hand(hand, pose, np.eye(3)).vertices * MIRROR
 
 
 def _wrist_section(hand: Hand) -> tuple[Array, Array]:
