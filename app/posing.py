@@ -17,6 +17,7 @@ from spf.frame import Frame
 from spf.hand import HandShape, SavedPose
 from spf.hand.handles import Stance, dragged, turned_home
 from spf.hand.model import Side
+from spf.hand.shape import varied
 from spf.lens import seen_through
 from spf.posing import Explained, calibrated_from, explained, first_stance, fitted_from, open_hand
 from spf.prepare import SessionFrames
@@ -89,7 +90,7 @@ class Posing(param.Parameterized):
             return None
         row = next(row for row in self.state.lane.results.rows if row.result.index == summary.frame)
         stance = turned_home(Stance(row.result.pose, row.result.reference))
-        return Placed(summary.tracking.start.shape, stance)
+        return Placed(varied(summary.tracking.start.shape, row.result.shape_change), stance)
 
     async def begin(self) -> None:
         """Have a hand to pose: the estimate of a tracked frame, else what is suggested for the frame shown."""

@@ -17,7 +17,7 @@ from spf.optimisers.trajectory import Trajectory
 from spf.progress import Report
 from spf.sessions import Session
 from spf.settings import Settings
-from spf.track import TrackedFrame, Tracking, TrackState
+from spf.track import TrackedFrame, Tracking, TrackState, reshaped
 from spf.trackfile import TrackRow, row_of
 
 __all__ = ["Entry", "Results", "Seen", "Summary", "entry_of", "joint_error", "same_rules", "seen_again"]
@@ -253,7 +253,9 @@ def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before
         mask = observation.depth > 0
         depths = observation.depth[mask]
         seen = Seen(observation.top, observation.left, observation.camera, np.packbits(mask), depths)
-    return Entry(result._replace(info=info, observation=None), state, tracking, seen, before)
+    return Entry(
+        result._replace(info=info, observation=None), state, reshaped(tracking, result.shape_change), seen, before
+    )
 
 
 def seen_again(entry: Entry, frame: Frame) -> Observation:

@@ -24,15 +24,14 @@ from spf import __version__
 from spf.errors import SpfError
 from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import pose_hand
-from spf.hand.model import Hand
 from spf.joint_definitions import corrected_joints, definitions, relative_offsets
 from spf.lens import as_seen, as_stated
 from spf.manifest import Plan
 from spf.prepare import prepare
-from spf.runs import MANIFEST, read_run, reopen_session, track_plan
+from spf.runs import MANIFEST, Run, read_run, reopen_session, track_plan
 from spf.sessions import Session, open_session
 from spf.trackers import make_settings
-from spf.trackfile import Track, row_of, track_of
+from spf.trackfile import row_of, track_of
 
 __all__ = ["main"]
 
@@ -42,9 +41,7 @@ _STORED = Path(__file__).resolve().parent.parent / "spf" / "joint_definitions.js
 
 class _Tracked(NamedTuple):
     session: Session
-    hand: Hand
-    lens: float
-    track: Track
+    run: Run
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -70,7 +67,7 @@ def main(arguments: list[str] | None = None) -> None:
     entry = {
         "fitted": datetime.date.today().isoformat(),
         "recordings": [item.session.name for item in tracked],
-        "frames": [int((~item.track.lost).sum()) for item in tracked],
+        "frames": [int((~item.run.track.lost).sum()) for item in tracked],
         "how": "per joint, geometric median over held frames, each recording counting the same, of truth minus model in "
         f"the bone's frame, as a fraction of the hand's length; spf {__version__}, default tracker, start {options.init}, "
         f"seed {options.seed}",
@@ -84,28 +81,27 @@ def main(arguments: list[str] | None = None) -> None:
 def _tracked(source: Path, seed: int, init: str) -> _Tracked:
     if (source / MANIFEST).exists():
         run = read_run(source)
-        shape = run.plan.start.shape
-        return _Tracked(reopen_session(run.manifest), shape.hand(), shape.lens, run.track)
+        return _Tracked(reopen_session(run.manifest), run)
     session = open_session(source)
     start = prepare(session, init=init, seed=seed)
     if start.doubt:
         print(f"{session.name}: {start.doubt}", file=sys.stderr)
     plan = Plan("spf", "default", make_settings("spf"), seed, init, 0, len(session), start)
-    hand = start.shape.hand()
-    return _Tracked(
-        session, hand, start.shape.lens, track_of([row_of(r) for r in track_plan(session, plan)], hand.dof_names)
-    )
+    track = track_of([row_of(r) for r in track_plan(session, plan)], start.shape.hand().dof_names)
+    return _Tracked(session, Run({}, plan, track))
 
 
 def _offsets(item: _Tracked) -> Array:
     """(N, 21, 3) offsets in the frames that the hand was held in; NaN where there is no truth."""
-    held = np.flatnonzero(~item.track.lost)
+    track, lens = item.run.track, item.run.plan.start.shape.lens
+    held = np.flatnonzero(~track.lost)
     result = np.full((len(held), len(JOINT_NAMES), 3), np.nan)
     for place, row in enumerate(held):
-        truth = item.session.truth(int(item.track.frame[row]))
+        truth = item.session.truth(int(track.frame[row]))
         if truth is not None:
-            posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
-            result[place] = relative_offsets(item.hand, posed, as_seen(truth.joints, item.lens))
+            hand = item.run.hand_at(int(row))
+            posed = pose_hand(hand, track.poses[row], track.references[row])
+            result[place] = relative_offsets(hand, posed, as_seen(truth.joints, lens))
     return result
 
 
@@ -125,12 +121,14 @@ def _mean_distance(place: Array, recordings: list[Array]) -> float:
 
 def _errors(item: _Tracked, offsets: Array) -> Array:
     """(N, 21) m in all frames, lost ones included."""
-    result = np.full((len(item.track), len(JOINT_NAMES)), np.nan)
-    for row, index in enumerate(item.track.frame):
+    track, lens = item.run.track, item.run.plan.start.shape.lens
+    result = np.full((len(track), len(JOINT_NAMES)), np.nan)
+    for row, index in enumerate(track.frame):
         truth = item.session.truth(int(index))
         if truth is not None:
-            posed = pose_hand(item.hand, item.track.poses[row], item.track.references[row])
-            joints = as_stated(corrected_joints(item.hand, posed, offsets), item.lens)
+            hand = item.run.hand_at(row)
+            posed = pose_hand(hand, track.poses[row], track.references[row])
+            joints = as_stated(corrected_joints(hand, posed, offsets), lens)
             result[row] = np.linalg.norm(joints - truth.joints, axis=1)
     return result
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from spf.calibrate import View, fit_shape
+from spf.calibrate import fit_shape
 from spf.hand.shape import HandShape
 from spf.locate import locate, reach_of
 from spf.observation import observe
 from spf.prepare import prepare
 from spf.search import SearchSettings
 from spf.segmentation import find_regions
+from spf.shape_equations import View
 from spf.synthetic import SyntheticSettings, synthesise
 from spf.track import begin, track_frame
 from spf.trackers import TRACKERS, make_settings

@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.calibrate import View, fit_shape, size_by_render
+from spf.calibrate import fit_shape, size_by_render
 from spf.cost.spheres import digit_spheres
 from spf.errors import StartError
 from spf.filters import smart
@@ -29,6 +29,7 @@ from spf.locate import reach_of, seen_at, strangeness
 from spf.observation import Observation, Suggestion, observe
 from spf.progress import Report, silent
 from spf.search import SearchSettings, size_penalty
+from spf.shape_equations import View
 
 __all__ = ["Doubted", "Start", "find_start"]
 

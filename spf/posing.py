@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.calibrate import View, fit_shape, size_by_render
+from spf.calibrate import fit_shape, size_by_render
 from spf.cost.problem import Problem, golden, make_problem
 from spf.cost.spheres import digit_spheres
 from spf.errors import StartError
@@ -25,6 +25,7 @@ from spf.observation import Observation, observe
 from spf.optimisers.smd import optimise
 from spf.progress import Report, part_of, silent
 from spf.segmentation import Region, find_regions
+from spf.shape_equations import View
 
 __all__ = ["Explained", "calibrated_from", "explained", "first_stance", "fitted_from", "open_hand"]
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from spf.calibrate import View, fit_shape
+from spf.calibrate import fit_shape
 from spf.cost.problem import golden, make_problem
 from spf.cost.settings import CostSettings
 from spf.errors import HandError, StartError
@@ -26,6 +26,7 @@ from spf.locate import reach_of
 from spf.observation import observe
 from spf.progress import Report
 from spf.sessions import Session
+from spf.shape_equations import View
 
 __all__ = ["SessionFrames", "fit_pose", "prepare", "side_of"]
 

@@ -8,8 +8,11 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from spf.errors import RunError
+from spf.hand.model import Hand
+from spf.hand.shape import varied
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.progress import Report, silent
+from spf.refine import modelled
 from spf.sessions import Session, open_session
 from spf.track import TrackedFrame, Tracking, TrackState, begin, run, stated_joints, track_frame
 from spf.trackfile import Track, TrackRow, joined, read_track, row_of, track_of, write_track
@@ -47,6 +50,10 @@ class Run(NamedTuple):
     manifest: dict[str, Any]
     plan: Plan
     track: Track
+
+    def hand_at(self, row: int) -> Hand:
+        """Return the hand that a row of the track was tracked with: its shape may have been refined on the way."""
+        return modelled(varied(self.plan.start.shape, self.track.shape_changes[row]))[0]
 
 
 def begin_late(plan: Plan, frame: int, time: float) -> tuple[Tracking, TrackState]:

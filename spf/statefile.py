@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from spf.errors import RunError
 from spf.filters.particles import ParticleSet
 from spf.filters.step import State
+from spf.refine import Refinement
 from spf.track import TrackState
 
 __all__ = ["read_states", "write_states"]
 
 _NUMBERS = ("time", "lost", "bad", "fresh", "golden", "missing", "doubts")
+_REFINED = ("change", "information", "vector", "candidate", "share", "waited")
 
 
 def write_states(states: Mapping[int, TrackState], path: Path) -> None:
@@ -43,6 +45,9 @@ def write_states(states: Mapping[int, TrackState], path: Path) -> None:
         "held": np.array([state.held for state in kept]),
     }
     arrays |= {name: np.array([getattr(state, name) for state in kept]) for name in _NUMBERS[1:]}
+    arrays |= {name: np.array([getattr(state.refinement, name) for state in kept]) for name in _REFINED}
+    arrays["judged"] = np.array([len(state.refinement.gains) for state in kept], dtype=np.int64)
+    arrays["gains"] = np.array([gain for state in kept for gain in state.refinement.gains], dtype=np.float64)
     for name in ParticleSet._fields:
         arrays[name] = np.concatenate([getattr(part, name) for part in particles]) if kept else np.empty(0)
     part_file = path.with_name(path.name + ".part")
@@ -73,16 +78,24 @@ def read_states(path: Path) -> dict[int, TrackState]:
 
 
 def _states_of(arrays: dict[str, NDArray[Any]]) -> dict[int, TrackState]:
-    ends, told = np.cumsum(arrays["count"]), np.cumsum(arrays["histories"])
+    ends = np.cumsum(arrays["count"])
+    histories, gains = _parted(arrays, "history", "histories"), _parted(arrays, "gains", "judged")
     states: dict[int, TrackState] = {}
     for i, frame in enumerate(arrays["frame"]):
         of = slice(int(ends[i] - arrays["count"][i]), int(ends[i]))
-        history = arrays["history"][int(told[i] - arrays["histories"][i]) : int(told[i])]
         time, lost, bad, fresh, golden, missing, doubts = (arrays[name][i] for name in _NUMBERS)
         particles = ParticleSet(*(arrays[name][of] for name in ParticleSet._fields))
         filter_state = State(particles, arrays["reference"][i], arrays["estimate"][i], float(time))
+        change, information, vector, candidate, share, waited = (arrays[name][i] for name in _REFINED)
+        refinement = Refinement(change, information, vector, candidate, gains[i], float(share), int(waited))
         states[int(frame)] = TrackState(
-            filter_state, bool(lost), tuple(float(value) for value in history), int(bad), bool(fresh), float(golden),
-            int(missing), arrays["held"][i], int(doubts),
+            filter_state, bool(lost), histories[i], int(bad), bool(fresh), float(golden), int(missing), arrays["held"][i],
+            refinement, int(doubts),
         )  # fmt: skip
     return states
+
+
+def _parted(arrays: dict[str, NDArray[Any]], values: str, counts: str) -> list[tuple[float, ...]]:
+    """Numbers of which each state has so many, one after the other: those of each state."""
+    ends = np.cumsum(arrays[counts])[:-1]
+    return [tuple(part.tolist()) for part in np.split(arrays[values], ends)]

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from spf.cost.spheres import digit_spheres
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of, relative_to_camera
-from spf.hand.model import Hand
+from spf.hand.model import DOF_NAMES, Hand
+from spf.hand.shape import UNCHANGED, varied
 from spf.initialise import Start
 from spf.kernels.cost import Spheres
 from spf.learned.guesses import Guess
@@ -27,10 +27,12 @@ from spf.locate import FAMILIAR, reach_of, seen_at, strangeness_to
 from spf.observation import Observation, Suggestion, observe
 from spf.parallel import map_threads
 from spf.recover import glance, recover, unlikely
+from spf.refine import Refinement, agreement, is_due, modelled, refined, unrefined
 from spf.settings import Settings
+from spf.shape_equations import View
 from spf.trackers import TRACKERS
 
-__all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "run", "stated_joints", "track_frame"]
+__all__ = ["TrackState", "TrackedFrame", "Tracking", "begin", "reshaped", "run", "stated_joints", "track_frame"]
 
 Array = NDArray[np.float64]
 _HISTORY = 30  # golden energies that a loss is judged against
@@ -77,6 +79,7 @@ class TrackState(NamedTuple):
         golden: golden energy of the last estimate, and what it is charged for being strange; 1 when there is none.
         missing: frames since the hand was lost.
         held: (D,) the last estimate before those bad frames, relative to the camera's axes: where a hand is looked for.
+        refinement: what is known of the hand's shape.
         doubts: frames in a row in which the estimate may be on something else than the hand.
     """
 
@@ -88,6 +91,7 @@ class TrackState(NamedTuple):
     golden: float
     missing: int
     held: Array
+    refinement: Refinement
     doubts: int = 0
 
 
@@ -110,6 +114,7 @@ class TrackedFrame(NamedTuple):
         info: everything that happened in the filter; None while lost.
         observation: what was seen; None while lost.
         place: (3,) m, around which it was looked for; None while lost, and of a run that was read.
+        shape_change: (9,) of the hand that it was tracked with, from the start's: see :func:`spf.hand.shape.varied`.
     """
 
     index: int  # type: ignore[assignment]  # a frame has an index; a tuple's method of that name is not missed
@@ -128,21 +133,29 @@ class TrackedFrame(NamedTuple):
     info: StepInfo | None
     observation: Observation | None
     place: Array | None = None
+    shape_change: Array = UNCHANGED
 
 
 def begin(
     tracker: str, settings: Settings, start: Start, seed: int, *, time: float = 0.0, free_dip: bool = False
 ) -> tuple[Tracking, TrackState]:
     """Set up a run from a first pose, which holds a thirtieth of a second before ``time``, its frame's, in seconds."""
-    hand = start.shape.hand(free_dip=free_dip)
-    tracking = Tracking(tracker, settings, start, hand, digit_spheres(hand), seed, available_network()[0])
-    return tracking, _restart(tracking, start.pose, start.reference, time - _FRAME)
+    hand, spheres = modelled(start.shape, free_dip=free_dip)
+    tracking = Tracking(tracker, settings, start, hand, spheres, seed, available_network()[0])
+    return tracking, _restart(tracking, start.pose, start.reference, time - _FRAME, unrefined())
 
 
-def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float) -> TrackState:
+def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float, refinement: Refinement) -> TrackState:
     count = getattr(tracking.settings, "n", 1)
     state = start_at(tracking.hand, pose, reference, time_, count)
-    return TrackState(state, False, (), 0, True, 1.0, 0, relative_to_camera(pose, reference))
+    return TrackState(state, False, (), 0, True, 1.0, 0, relative_to_camera(pose, reference), refinement)
+
+
+def reshaped(tracking: Tracking, change: Array) -> Tracking:
+    """Return what a frame was tracked with whose hand had another shape (:attr:`TrackedFrame.shape_change`) than the start's."""
+    shape = varied(tracking.start.shape, change)
+    hand, spheres = modelled(shape, free_dip=tracking.hand.dofs > len(DOF_NAMES))
+    return tracking._replace(hand=hand, spheres=spheres)
 
 
 def track_frame(
@@ -151,7 +164,7 @@ def track_frame(
     """Track one frame.
 
     Args:
-        tracking: the run; replace its settings and they take effect with this frame.
+        tracking: the run; replace its settings and they take effect with this frame. Its hand is the state's in any case.
         state: after the last frame.
         frame: the depth image.
         record: whether to keep the trajectories of SMD in the frame's info.
@@ -161,6 +174,7 @@ def track_frame(
     """
     began = time.perf_counter()
     frame = seen_through(frame, tracking.start.shape.lens)
+    tracking = reshaped(tracking, state.refinement.change)
     rng = np.random.default_rng([tracking.seed, frame.index])
     was_lost = state.lost
     if was_lost:
@@ -180,18 +194,21 @@ def track_frame(
             state, doubts = elsewhere, 0
             looked = _look(tracking, state, frame)
             new, info = _stepped(tracking, state, looked, rng, record)
-    new = new._replace(doubts=doubts)
+    began_refining = time.perf_counter()
+    refinement = _refined(tracking, state, new, info, looked.observation, frame.index)
+    new = new._replace(doubts=doubts, refinement=refinement)
     joints = stated_joints(tracking, info.estimate, info.reference)
     timings = {
         "search": searched - began,
         "observe": observed - searched,
         **info.timings,
+        "refine": time.perf_counter() - began_refining,
     }
     seconds = time.perf_counter() - began
     result = TrackedFrame(
         frame.index, frame.time, info.estimate, info.reference, joints, new.lost, was_lost and not new.lost,
         info.estimate_log_likelihood, info.ess, info.estimate_golden, info.estimate_overlap, seconds, timings,
-        info, looked.observation, state.filter.estimate[:3],
+        info, looked.observation, state.filter.estimate[:3], state.refinement.change,
     )  # fmt: skip
     return new, result
 
@@ -262,7 +279,7 @@ def _glanced(
     charged = info.estimate_golden + _strangeness(tracking, info, seen) + unlikely(here, state.held, within)
     if found is None or found[0] > charged - _CLEARLY:
         return None
-    fresh = _restart(tracking, found[1], np.eye(3), frame.time - _FRAME)
+    fresh = _restart(tracking, found[1], np.eye(3), frame.time - _FRAME, state.refinement)
     return fresh._replace(history=new.history, held=state.held)
 
 
@@ -275,7 +292,7 @@ def _sought(tracking: Tracking, state: TrackState, frame: Frame, rng: np.random.
     found = recover(frame, tracking.hand, limit, better, state.held, within, state.missing, tracking.network, rng)
     if found is None:
         return state
-    fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME)
+    fresh = _restart(tracking, found, np.eye(3), frame.time - _FRAME, state.refinement)
     return fresh._replace(history=state.history, lost=True, bad=state.bad, missing=state.missing, held=state.held)
 
 
@@ -312,7 +329,24 @@ def _judged(
     lost = absent or not (usual or familiar) if state.lost else count >= _PATIENCE
     missing = state.missing + 1 if lost else 0
     held = state.held if bad or lost else relative_to_camera(filter_state.estimate, filter_state.reference)
-    return TrackState(filter_state, lost, history, count, False, golden + strange, missing, held, state.doubts)
+    return TrackState(
+        filter_state, lost, history, count, False, golden + strange, missing, held, state.refinement, state.doubts
+    )
+
+
+def _refined(
+    tracking: Tracking, state: TrackState, new: TrackState, info: StepInfo, observation: Observation, index: int
+) -> Refinement:
+    """Refine the hand's shape where the frame is a good view of it: the hand is held, explained as usual, and sure."""
+    refinement = state.refinement._replace(waited=state.refinement.waited + 1)
+    good = not (new.lost or new.bad or new.doubts) and info.estimate_golden < _believable(state, tracking)
+    if not (getattr(tracking.settings, "refine_shape", False) and good and is_due(state.refinement)):
+        return refinement
+    counts = agreement(tracking.hand, info)
+    if not counts:
+        return refinement
+    view = View(observation, info.estimate, info.reference)
+    return refined(refinement, tracking.start.shape, view, counts, [tracking.seed, index, 1])
 
 
 def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> TrackedFrame:
@@ -321,7 +355,7 @@ def _lost(tracking: Tracking, state: TrackState, frame: Frame, began: float) -> 
     seconds = time.perf_counter() - began
     return TrackedFrame(
         frame.index, frame.time, state.filter.estimate, state.filter.reference, joints, True, False,
-        nan, nan, nan, nan, seconds, {"search": seconds}, None, None,
+        nan, nan, nan, nan, seconds, {"search": seconds}, None, None, None, state.refinement.change,
     )  # fmt: skip
 
 

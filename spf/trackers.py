@@ -114,6 +114,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "recombination": 0.0,
         "learned": False,
         "prediction_pull": 0.0,
+        "refine_shape": False,
         "dynamics": "first-order",
     },
 }

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from spf.errors import RunError
 from spf.frame import JOINT_NAMES
+from spf.hand.shape import SHAPE_PARAMETERS
 from spf.track import TrackedFrame
 
 __all__ = ["Track", "TrackRow", "joined", "read_track", "row_of", "rows_of", "table_of", "track_of", "write_track"]
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 _JOINTS = tuple(f"joint_{name}_{axis}" for name in JOINT_NAMES for axis in "xyz")
 _REFERENCE = tuple(f"reference_{row}{column}" for row in range(3) for column in range(3))
 _NUMBERS = ("log_likelihood", "ess", "golden", "overlap", "optimised_share", "evaluations", "seconds")
+_SHAPE = tuple(f"shape_{name}" for name in SHAPE_PARAMETERS)
 _POSE, _STAGE = "pose_", "seconds_"
 
 
@@ -37,6 +39,7 @@ class Track:
         poses: (N, D), metres and radians, relative to ``references``; the last one known while the hand is lost.
         references: (N, 3, 3) R_ref.
         joints: (N, 21, 3) m, of the hand model.
+        shape_changes: (N, 9) of the hand in each frame, from the start's shape: see :func:`spf.hand.shape.varied`.
         lost, recovered: (N,) whether the hand is lost in a frame, and whether it was found again in it.
         log_likelihood, ess, golden, overlap, optimised_share, evaluations: (N,) NaN where no filter step was made.
         winner: (N,) proposal that the heaviest particle came from; "" where no filter step was made.
@@ -50,6 +53,7 @@ class Track:
     poses: Array
     references: Array
     joints: Array
+    shape_changes: Array
     lost: NDArray[np.bool_]
     recovered: NDArray[np.bool_]
     log_likelihood: Array
@@ -106,6 +110,7 @@ def track_of(rows: Sequence[TrackRow], dof_names: tuple[str, ...]) -> Track:
         poses=numbers([result.pose for result in results]).reshape(count, len(dof_names)),
         references=numbers([result.reference for result in results]).reshape(count, 3, 3),
         joints=numbers([result.joints for result in results]).reshape(count, len(JOINT_NAMES), 3),
+        shape_changes=numbers([result.shape_change for result in results]).reshape(count, len(SHAPE_PARAMETERS)),
         lost=np.array([result.lost for result in results], dtype=bool),
         recovered=np.array([result.recovered for result in results], dtype=bool),
         log_likelihood=numbers([result.log_likelihood for result in results]),
@@ -148,6 +153,7 @@ def rows_of(track: Track) -> list[TrackRow]:
         result = TrackedFrame(
             int(track.frame[i]), float(track.time[i]), track.poses[i], track.references[i], track.joints[i],
             bool(track.lost[i]), bool(track.recovered[i]), likelihood, ess, golden, overlap, seconds, timings, None, None,
+            None, track.shape_changes[i],
         )  # fmt: skip
         rows.append(
             TrackRow(result, float(track.optimised_share[i]), float(track.evaluations[i]), str(track.winner[i]))
@@ -161,7 +167,9 @@ def table_of(track: Track) -> pa.Table:
     columns |= {"lost": track.lost, "recovered": track.recovered, "winner": track.winner.tolist()}
     columns |= {name: getattr(track, name) for name in _NUMBERS}
     columns |= {_POSE + name: track.poses[:, i] for i, name in enumerate(track.dof_names)}
-    columns |= _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints)
+    columns |= (
+        _split(_REFERENCE, track.references) | _split(_JOINTS, track.joints) | _split(_SHAPE, track.shape_changes)
+    )
     columns |= {_STAGE + stage: values for stage, values in track.timings.items()}
     return pa.table(columns)
 
@@ -209,16 +217,18 @@ def read_track(path: Path) -> Track:
     def stacked(names: Sequence[str], *shape: int) -> Array:
         return np.stack([found[name] for name in names], axis=1).reshape(len(table), *shape)
 
+    # Tracks that were written before shapes were refined lack these columns, and those before proposals were counted winners.
+    found |= {name: np.zeros(len(table)) for name in _SHAPE if name not in found}
     return Track(
         frame=found["frame"],
         time=found["time"],
         poses=stacked([_POSE + name for name in dof_names], len(dof_names)),
         references=stacked(_REFERENCE, 3, 3),
         joints=stacked(_JOINTS, len(JOINT_NAMES), 3),
+        shape_changes=stacked(_SHAPE, len(_SHAPE)),
         lost=found["lost"],
         recovered=found["recovered"],
         **{name: found[name] for name in _NUMBERS},
-        # Tracks that were written before proposals were counted have no such column.
         winner=np.asarray(found.get("winner", [""] * len(table)), dtype=np.str_),
         dof_names=dof_names,
         timings={name.removeprefix(_STAGE): found[name] for name in found if name.startswith(_STAGE)},

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from benchmarks.holds.sessions import open_source, synthetic
-from spf.calibrate import View, size_by_render
+from spf.calibrate import size_by_render
 from spf.hand import HandShape
 from spf.hand.kinematics import joints_of
 from spf.initialise import find_start
 from spf.locate import reach_of
 from spf.observation import observe
 from spf.prepare import SessionFrames, fit_pose
+from spf.shape_equations import View
 from spf.synthetic import SyntheticSettings, synthesise
 
 

@@ -27,7 +27,7 @@ from spf.filters.smart import SpfSettings
 from spf.filters.uncertainty import reach_of_share, uncertainty_of
 from spf.initialise import find_start
 from spf.prepare import SessionFrames
-from spf.track import begin, track_frame
+from spf.track import begin, reshaped, track_frame
 
 __all__ = ["LEVELS", "coverage", "fitted", "main"]
 
@@ -79,7 +79,8 @@ def _measured(source: Source, count: int) -> list[dict[str, Any]]:
         if frame.index % _EVERY or frame.truth is None or result.info is None or result.observation is None:
             continue
         began = time.perf_counter()
-        said = uncertainty_of(tracking.hand, result.observation, result.info, settings, factor=1.0)
+        hand = reshaped(tracking, result.shape_change).hand
+        said = uncertainty_of(hand, result.observation, result.info, settings, factor=1.0)
         seconds = time.perf_counter() - began
         errors = frame.truth.joints - result.joints
         rows.append({

@@ -33,7 +33,7 @@ from spf.lens import seen_through
 from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession, synthesise
-from spf.track import Tracking, TrackState, begin, track_frame
+from spf.track import Tracking, TrackState, begin, reshaped, track_frame
 from spf.trackers import make_settings
 
 __all__ = ["kidnapped", "main"]
@@ -199,10 +199,10 @@ def _followed(
     session: Session, tracking: Tracking, state: TrackState, frames: SessionFrames, labelled: Hand
 ) -> dict[str, Any]:
     """Track on after a kidnap, and say when it was noticed and when the hand was held again, in frames; None for never."""
-    own = as_labelled(session, tracking.hand)
     above, lost, seconds = [], [], []
     for frame in frames:
         state, result = track_frame(tracking, state, frame)
+        own = as_labelled(session, reshaped(tracking, result.shape_change).hand)
         joints = joints_of(own, result.pose, result.reference)
         if isinstance(session, SyntheticSession):
             assert frame.truth is not None

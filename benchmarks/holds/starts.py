@@ -29,7 +29,7 @@ from spf.initialise import Start, find_start
 from spf.lens import as_stated
 from spf.prepare import SessionFrames
 from spf.sessions import Session
-from spf.track import begin, track_frame
+from spf.track import begin, reshaped, track_frame
 from spf.trackers import make_settings
 
 __all__ = ["main"]
@@ -141,12 +141,12 @@ def _found(session: Session, place: _Place, given: int, hand: Hand, side: str | 
             "seconds": 0.0,
         }
     seconds = time.perf_counter() - began
-    found, lens = as_labelled(session, start.shape.hand()), start.shape.lens
-    posed = (start.pose, start.reference) if given == 1 else _followed(frames, start)
+    lens = start.shape.lens
+    found, *posed = (start.shape.hand(), start.pose, start.reference) if given == 1 else _followed(frames, start)
     floor = floor_of(hand, frames[-1], np.random.default_rng(0), exact=True)
     apart = None
     if floor is not None:
-        joints = as_stated(joints_of(found, *posed), lens)
+        joints = as_stated(joints_of(as_labelled(session, found), *posed), lens)
         apart = _apart_mm(joints, joints_of(hand, floor.pose, floor.reference))
     return row | {
         "apart_mm": apart, "right_side": start.shape.side == side, "golden": start.golden, "margin": start.margin,
@@ -154,12 +154,12 @@ def _found(session: Session, place: _Place, given: int, hand: Hand, side: str | 
     }  # fmt: skip
 
 
-def _followed(frames: SessionFrames, start: Start) -> tuple[Array, Array]:
-    """Track from a start to the last frame: (pose, reference) there."""
+def _followed(frames: SessionFrames, start: Start) -> tuple[Hand, Array, Array]:
+    """Track from a start to the last frame: (hand, pose, reference) there."""
     tracking, state = begin("spf", make_settings("spf"), start, 0, time=frames[start.frame].time)
     for frame in frames[start.frame :]:
         state, result = track_frame(tracking, state, frame)
-    return result.pose, result.reference
+    return reshaped(tracking, result.shape_change).hand, result.pose, result.reference
 
 
 def _apart_mm(joints: Array, others: Array) -> float:

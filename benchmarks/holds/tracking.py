@@ -19,7 +19,7 @@ from spf.lens import as_stated, seen_through
 from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
 from spf.synthetic import SyntheticSession
-from spf.track import begin, track_frame
+from spf.track import begin, reshaped, track_frame
 from spf.trackers import TRACKERS, make_settings
 
 __all__ = ["Asked", "held"]
@@ -116,7 +116,7 @@ def _tracked(
     """Track from a start; everything by frame, from the start's on."""
     settings = make_settings(asked.tracker, asked.preset, _with_count(asked, count))
     tracking, state = begin(asked.tracker, settings, start, source.seed, time=float(session.times[start.frame]))
-    hand, lens = as_labelled(session, tracking.hand), start.shape.lens
+    lens = start.shape.lens
     rows: dict[str, list[Any]] = {
         "error_mm": [], "largest_mm": [], "lost": [], "golden": [], "iou": [], "seconds": [], "cpu_seconds": []
     }  # fmt: skip
@@ -125,14 +125,15 @@ def _tracked(
         state, result = track_frame(tracking, state, frame)
         rows["cpu_seconds"].append(round(time.process_time() - began, 5))
         rows["seconds"].append(round(result.seconds, 5))
+        hand = reshaped(tracking, result.shape_change).hand
         rows["lost"].append(bool(result.lost))
         rows["golden"].append(None if np.isnan(result.golden) else round(result.golden, 4))
         if not source.synthetic:
-            agreement = agreement_with_depth(tracking.hand, result.pose, result.reference, seen_through(frame, lens))
+            agreement = agreement_with_depth(hand, result.pose, result.reference, seen_through(frame, lens))
             rows["iou"].append(0.0 if result.lost else round(agreement.silhouette_iou, 4))
         errors = None
         if frame.truth is not None:
-            joints = as_stated(joints_of(hand, result.pose, result.reference), lens)
+            joints = as_stated(joints_of(as_labelled(session, hand), result.pose, result.reference), lens)
             errors = np.linalg.norm(joints - frame.truth.joints, axis=1)
         rows["error_mm"].append(None if errors is None else _mm(errors))
         rows["largest_mm"].append(None if errors is None else round(1e3 * float(np.nanmax(errors)), 3))

@@ -96,18 +96,17 @@ def compare_run(run: Run, session: Session, progress: Report | None = None) -> C
     """
     known = offsets_of(session.joint_definition) if session.has_truth else None
     offsets = np.zeros((len(JOINT_NAMES), 3)) if known is None else known
-    track, found = run.track, run.plan.start.shape
-    hand = found.hand()
+    track, lens = run.track, run.plan.start.shape.lens
     result = Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (), ())))
     for row, index in enumerate(track.frame):
-        frame = session[int(index)]
+        frame, hand = session[int(index)], run.hand_at(row)
         posed = pose_hand(hand, track.poses[row], track.references[row])
-        result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), found.lens)
+        result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), lens)
         if frame.truth is not None:
             result.truth[row] = frame.truth.joints
         if not track.lost[row]:
             result.iou[row], result.distance[row] = agreement_with_depth(
-                hand, track.poses[row], track.references[row], seen_through(frame, found.lens)
+                hand, track.poses[row], track.references[row], seen_through(frame, lens)
             )
         if progress is not None:
             progress("Comparing with the depth", (row + 1) / len(track))

@@ -97,13 +97,12 @@ def _pictures(
     run: Run, session: Session, renderer: Renderer, view: View, size: tuple[int, int], whole: tuple[int, int]
 ) -> Iterator[NDArray[np.uint8]]:
     """The frames of a film; one is drawn while the one before is being put together."""
-    track, shape = run.track, run.plan.start.shape
-    hand = shape.hand()
+    track, lens = run.track, run.plan.start.shape.lens
     cameras = _steady_views(track, view)
     ahead: tuple[int, Frame, Future[Any]] | None = None
     for row, index in enumerate(track.frame):
         frame = session[int(index)]
-        drawn = renderer.submit(hand_scene(hand, track, row, frame, shape.lens), cameras[row], size)
+        drawn = renderer.submit(hand_scene(run.hand_at(row), track, row, frame, lens), cameras[row], size)
         if ahead is not None:
             yield _composed(run, *ahead[:2], ahead[2].result(), size, whole)
         ahead = row, frame, drawn

@@ -172,8 +172,7 @@ def write_picture(
     if path.suffix not in (".png", ".jpg"):
         raise SettingError(f"A picture is written as .png or .jpg, not as '{path.suffix}': name {path} otherwise.")
     row = row_of_frame(run.track, frame)
-    shape = run.plan.start.shape
-    scene = hand_scene(shape.hand(), run.track, row, session[frame], shape.lens)
+    scene = hand_scene(run.hand_at(row), run.track, row, session[frame], run.plan.start.shape.lens)
     picture = renderer.picture(scene, hand_view(run.track, row, view), size, smooth=True)
     with written_whole(path) as part:
         part.write_bytes(encoded(picture, path.suffix))

@@ -44,6 +44,9 @@ class SpfSettings(
     prediction_pull: float = setting(
         0.01, "pull of SMD to the prediction, in units of the process noise", group=_FILTER, low=0.0, high=10.0
     )
+    refine_shape: bool = setting(
+        True, "go on refining the hand's shape, in views that tell something of it", group=_FILTER
+    )
 
 
 def step(

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from spf.errors import HandError
 from spf.hand.model import BONES, FINGERS, Hand, Side, assemble_hand, bone_weights, load_hand
 
-__all__ = ["HandShape", "read_hand_shape", "shaped", "write_hand_shape"]
+__all__ = ["SHAPE_PARAMETERS", "UNCHANGED", "HandShape", "read_hand_shape", "shaped", "varied", "write_hand_shape"]
+
+#: What of a shape is estimated; :func:`varied` takes the logarithm of a factor on each.
+SHAPE_PARAMETERS = ("scale", *FINGERS, "palm_width", "palm_thickness", "finger_thickness")
+
+#: The change that :func:`varied` leaves a shape as it is with.
+UNCHANGED = np.zeros(len(SHAPE_PARAMETERS))
+UNCHANGED.flags.writeable = False
 
 _FORMAT = "spf-hand-shape"
 _SCALE_RANGE = (0.4, 2.0)
@@ -132,6 +139,24 @@ def _stretch(shape: HandShape) -> NDArray[np.float64]:
 def lengths_of_digits(factors: tuple[float, float, float, float, float]) -> tuple[float, ...]:
     """Return the 15 bone lengths of one factor a digit, thumb to little."""
     return tuple(float(factor) for factor in factors for _ in range(len(BONES) // len(FINGERS)))
+
+
+def varied(shape: HandShape, change: NDArray[np.float64]) -> HandShape:
+    """Return a shape with a factor on each of its parameters.
+
+    Args:
+        shape: to vary.
+        change: (P,) logarithms of the factors, in the order of ``SHAPE_PARAMETERS``.
+    """
+    factors = np.exp(change)
+    digits = lengths_of_digits(tuple(factors[1:6]))
+    return shape._replace(
+        scale=float(shape.scale * factors[0]),
+        lengths=tuple(length * factor for length, factor in zip(shape.lengths, digits, strict=True)),
+        palm_width=float(shape.palm_width * factors[6]),
+        palm_thickness=float(shape.palm_thickness * factors[7]),
+        finger_thickness=float(shape.finger_thickness * factors[8]),
+    )
 
 
 def write_hand_shape(shape: HandShape, path: str | Path) -> None:

@@ -90,15 +90,15 @@ def shots(
         SessionError: a frame cannot be read.
         RenderError: a picture could not be drawn.
     """
-    hand, track = run.plan.start.shape.hand(), run.track
+    track, lens = run.track, run.plan.start.shape.lens
     for done, key in enumerate(keys, 1):
-        frame = session[int(track.frame[key.row])]
+        frame, hand = session[int(track.frame[key.row])], run.hand_at(key.row)
         renders: tuple[bytes, ...] = ()
         if renderer is not None:
-            scene = hand_scene(hand, track, key.row, frame, run.plan.start.shape.lens)
+            scene = hand_scene(hand, track, key.row, frame, lens)
             views = [hand_view(track, key.row, VIEWS[side]) for side in _SIDES]
             renders = tuple(renderer.jpeg(scene, view, _SIZE, quality=85, smooth=True) for view in views)
-        yield Shot(key, _depth(hand, track, key.row, frame, run.plan.start.shape.lens), renders)
+        yield Shot(key, _depth(hand, track, key.row, frame, lens), renders)
         if progress is not None:
             progress("Drawing the key frames", done / len(keys))
 
