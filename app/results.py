@@ -87,6 +87,7 @@ class Summary(NamedTuple):
         golden, overlap: how well the render explains the depth, nan while lost.
         error: mean distance of the joints from the truth, m; nan where there is no truth.
         seconds: spent on the frame.
+        shape_change: (9,) of the hand, from the start's: see :func:`spf.hand.shape.varied`.
         tracking: what it was tracked with.
     """
 
@@ -102,6 +103,7 @@ class Summary(NamedTuple):
     overlap: float
     error: float
     seconds: float
+    shape_change: NDArray[np.float64]
     tracking: Tracking
 
 
@@ -239,7 +241,8 @@ def _summary_of(row: TrackRow, frame: Frame, tracking: Tracking, *, resampled: b
     result = row.result
     return Summary(
         result.index, result.joints, result.lost, result.recovered, result.ess, row.optimised_share, resampled,
-        row.winner, result.golden, result.overlap, joint_error(result.joints, frame), result.seconds, tracking,
+        row.winner, result.golden, result.overlap, joint_error(result.joints, frame), result.seconds,
+        result.shape_change, tracking,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ truth. They are fractions of the length of the hand, for hands differ in size; t
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -19,7 +20,7 @@ from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import PosedHand
 from spf.hand.model import MIRROR, Hand
 
-__all__ = ["MODEL", "corrected_joints", "definitions", "offsets_of", "relative_offsets"]
+__all__ = ["MODEL", "corrected_joints", "definitions", "offsets_of", "own_offsets", "relative_offsets"]
 
 Array = NDArray[np.float64]
 MODEL = "model"  # the project's own definition, which needs no correction
@@ -67,3 +68,21 @@ def relative_offsets(hand: Hand, posed: PosedHand, joints: Array) -> Array:
     mirror = MIRROR if hand.side == "left" else np.ones(3)
     rotations = posed.frames[hand.joint_bone][:, :, :3]
     return np.asarray(np.einsum("jik,ji->jk", rotations, joints - posed.joints) * mirror / hand.length)
+
+
+def own_offsets(hands: Sequence[tuple[Hand, PosedHand]], joints: Array) -> Array:
+    """Return the constant offsets (21, 3) that bring the joints of a track nearest to a truth, whatever that marks.
+
+    A truth whose joints are defined otherwise, or whose hand has other proportions, is compared with a track by them: they
+    take away what is the same in all frames. They are fitted to the very frames that they are used in.
+
+    Args:
+        hands: N, of a track, with their poses.
+        joints: (N, 21, 3) m, true joints; NaN where one is not known.
+
+    Returns:
+        medians over the frames; zeros for a joint that is never known.
+    """
+    relative = [relative_offsets(hand, posed, own) for (hand, posed), own in zip(hands, joints, strict=True)]
+    known = np.ma.masked_invalid(np.reshape(relative, (-1, *joints.shape[1:])))
+    return np.asarray(np.ma.median(known, axis=0).filled(0.0))

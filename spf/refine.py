@@ -30,14 +30,13 @@ __all__ = ["Refinement", "agreement", "is_due", "modelled", "refined", "unrefine
 
 Array = NDArray[np.float64]
 
-_PRIOR_SPREAD = np.array(
-    [0.03, *([0.1] * 5), 0.02, 0.02, 0.02]
-)  # of the start's shape: how far off its parameters may be
+_SPREAD = np.array([0.03, *([0.15] * 5), 0.02, 0.02, 0.02])  # of the start's shape: how far off its parameters may be
+_PRIOR = np.diag(_SPREAD**-2.0)
 _APART = 0.016  # of a hand's length, that samples' joints are apart on the average where a view counts 1/e
 _COUNTS = 0.05  # of a view, under which it is left out
-_EVERY = 5  # frames between two views, which are nearly the same when they follow each other
-_VIEWS = 4  # that judge a candidate
-_STEP = 0.03  # at most, of a parameter, from the present shape to a candidate
+_EVERY = 3  # frames between two views, which are nearly the same when they follow each other
+_VIEWS = 3  # that judge a candidate
+_STEP = 0.05  # at most, of a parameter, from the present shape to a candidate
 _LEAST_SHARE = 0.125  # of the way to the likeliest shape
 _FARTHEST = 0.3  # that a parameter can be from the start's
 _ROUNDS = 4  # of the descents that a candidate is judged after
@@ -68,7 +67,7 @@ class Refinement(NamedTuple):
 
 def unrefined() -> Refinement:
     """Return what is known of the shape when a run begins: it is the start's."""
-    return Refinement(UNCHANGED, np.diag(_PRIOR_SPREAD**-2.0), UNCHANGED, UNCHANGED, (), 1.0, 0)
+    return Refinement(UNCHANGED, _PRIOR, UNCHANGED, UNCHANGED, (), 1.0, 0)
 
 
 def is_due(refinement: Refinement) -> bool:

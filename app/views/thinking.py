@@ -13,6 +13,7 @@ from app.views.particles import Particles
 from app.views.plots import CALM, heading
 from app.views.samples import SamplesOverFrames
 from app.views.scene_tab import scene_card
+from app.views.shape_over_frames import ShapeOverFrames
 from app.views.step_sizes import StepSizes
 from app.views.winners import Winners
 from spf.render import Renderer
@@ -29,7 +30,7 @@ class Thinking:
         particles = Particles(state)
         plane, table = Coordinates(state, particles), ParticleTable(state, particles)
         descents, steps = Descents(state), StepSizes(state)
-        samples, winners = SamplesOverFrames(state), Winners(state)
+        samples, winners, shape = SamplesOverFrames(state), Winners(state), ShapeOverFrames(state)
         self.pictures, scene = scene_card(state, renderer, "particles", _PLANE_HEIGHT)
         words = heading("Particles of this frame", ("", CALM, "pick rows or markers to see only those in the pictures"))
         self.panel = cards(
@@ -41,6 +42,7 @@ class Thinking:
             card(steps.pane, steps.heading, _DESCENT_HEIGHT, least_width=420),
             card(samples.pane, samples.heading, _FRAMES_HEIGHT, least_width=420),
             card(winners.pane, winners.heading, _FRAMES_HEIGHT, least_width=420),
+            card(shape.pane, shape.heading, _FRAMES_HEIGHT, least_width=420),
         )  # fmt: skip
-        for follower in (particles, plane, table, descents, steps, samples, winners):
+        for follower in (particles, plane, table, descents, steps, samples, winners, shape):
             follower.draw()

@@ -12,9 +12,10 @@ from spf.evaluate.depth_agreement import agreement_with_depth
 from spf.evaluate.joint_errors import THRESHOLDS, JointMeasures, joint_errors, measure_joints
 from spf.evaluate.losses import count_losses
 from spf.frame import JOINT_NAMES
-from spf.hand.kinematics import pose_hand
-from spf.joint_definitions import corrected_joints, offsets_of
-from spf.lens import as_stated, seen_through
+from spf.hand.kinematics import PosedHand, pose_hand
+from spf.hand.model import Hand
+from spf.joint_definitions import corrected_joints, offsets_of, own_offsets
+from spf.lens import as_seen, as_stated, seen_through
 from spf.progress import Report
 from spf.runs import Run
 from spf.sessions import Session, marks_in
@@ -34,12 +35,14 @@ class Compared(NamedTuple):
     Attributes:
         truth: (N, 21, 3) m, true joints; NaN where unknown.
         corrected: (N, 21, 3) m, the run's joints where the data set would mark them.
+        nearest: (N, 21, 3) m, with the constant offsets that bring this very run nearest to its truth.
         iou: (N,) overlap of the silhouettes; NaN while the hand is lost.
         distance: (N,) m, mean distance of the observed points from the model; NaN while the hand is lost.
     """
 
     truth: Array
     corrected: Array
+    nearest: Array
     iou: Array
     distance: Array
 
@@ -60,7 +63,8 @@ def evaluate_run(run: Run, session: Session, progress: Report | None = None) -> 
     Returns:
         name → value, ready for JSON: errors and distances in mm, fractions from 0 to 1, None for what cannot be known.
         ``mean_joint_error_mm`` and all errors after it are those of the corrected joints where the data set's joint
-        definition was fitted, and ``correction`` says so.
+        definition was fitted, and ``correction`` says so; ``mean_joint_error_own_offsets_mm`` is what remains with one
+        constant offset a joint that is fitted to this very run.
 
     Raises:
         SessionError: a frame cannot be read.
@@ -78,7 +82,11 @@ def measures_of(run: Run, session: Session, compared: Compared) -> dict[str, Any
     if session.has_truth:
         raw = measure_joints(joint_errors(track.joints, compared.truth))
         corrected = measure_joints(compared.errors)
-        report |= _joints_part(raw, corrected) | {"correction": _correction_note(session, offsets)}
+        report |= _joints_part(raw, corrected)
+        report["mean_joint_error_own_offsets_mm"] = (
+            measure_joints(joint_errors(compared.nearest, compared.truth)).mean * 1e3
+        )
+        report |= {"correction": _correction_note(session, offsets)}
         report |= _marks_part(session, compared)
     return _plain(report | _depth_part(compared) | _losses_part(track) | _work_part(track))
 
@@ -97,10 +105,12 @@ def compare_run(run: Run, session: Session, progress: Report | None = None) -> C
     known = offsets_of(session.joint_definition) if session.has_truth else None
     offsets = np.zeros((len(JOINT_NAMES), 3)) if known is None else known
     track, lens = run.track, run.plan.start.shape.lens
-    result = Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (), ())))
+    result = Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (21, 3), (), ())))
+    hands: list[tuple[Hand, PosedHand]] = []
     for row, index in enumerate(track.frame):
         frame, hand = session[int(index)], run.hand_at(row)
         posed = pose_hand(hand, track.poses[row], track.references[row])
+        hands.append((hand, posed))
         result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), lens)
         if frame.truth is not None:
             result.truth[row] = frame.truth.joints
@@ -110,6 +120,9 @@ def compare_run(run: Run, session: Session, progress: Report | None = None) -> C
             )
         if progress is not None:
             progress("Comparing with the depth", (row + 1) / len(track))
+    held = np.flatnonzero(~track.lost)
+    own = own_offsets([hands[row] for row in held], as_seen(result.truth[held], lens))
+    result.nearest[:] = [as_stated(corrected_joints(*each, own), lens) for each in hands]
     return result
 
 

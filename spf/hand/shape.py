@@ -13,7 +13,16 @@ from numpy.typing import NDArray
 from spf.errors import HandError
 from spf.hand.model import BONES, FINGERS, Hand, Side, assemble_hand, bone_weights, load_hand
 
-__all__ = ["SHAPE_PARAMETERS", "UNCHANGED", "HandShape", "read_hand_shape", "shaped", "varied", "write_hand_shape"]
+__all__ = [
+    "SHAPE_PARAMETERS",
+    "UNCHANGED",
+    "HandShape",
+    "percent_of",
+    "read_hand_shape",
+    "shaped",
+    "varied",
+    "write_hand_shape",
+]
 
 #: What of a shape is estimated; :func:`varied` takes the logarithm of a factor on each.
 SHAPE_PARAMETERS = ("scale", *FINGERS, "palm_width", "palm_thickness", "finger_thickness")
@@ -157,6 +166,26 @@ def varied(shape: HandShape, change: NDArray[np.float64]) -> HandShape:
         palm_thickness=float(shape.palm_thickness * factors[7]),
         finger_thickness=float(shape.finger_thickness * factors[8]),
     )
+
+
+#: Part of a hand → places in ``SHAPE_PARAMETERS``.
+_PARTS = {
+    "size": [0],
+    "length of the thumb": [1],
+    "length of the fingers": [2, 3, 4, 5],
+    "palm": [6, 7],
+    "thickness of the digits": [8],
+}
+
+
+def percent_of(changes: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Return by how many per cent parts of a hand changed: part → (N,).
+
+    Args:
+        changes: (N, P) of :func:`varied`.
+    """
+    logs = changes.reshape(-1, len(SHAPE_PARAMETERS))
+    return {part: 100.0 * np.expm1(logs[:, places].mean(axis=1)) for part, places in _PARTS.items()}
 
 
 def write_hand_shape(shape: HandShape, path: str | Path) -> None:

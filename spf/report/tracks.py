@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from spf.evaluate import Compared
 from spf.hand.kinematics import rotation_about
+from spf.hand.shape import percent_of
 from spf.report.plots import Line, Panel, Plot, frame_plot
 from spf.runs import Run
 from spf.trackfile import Track
@@ -38,6 +39,20 @@ def track_plots(run: Run, compared: Compared | None) -> list[Plot]:
             "bend", "How the fingers bend", track.frame, [Panel("degrees", _bends(track), from_zero=False)], track.lost,
             "Sum of the flexions of all joints of a finger.",
         ),
+        *_shape(track),
+    ]  # fmt: skip
+
+
+def _shape(track: Track) -> list[Plot]:
+    """How the hand's shape was refined, where it was."""
+    if not track.shape_changes.any():
+        return []
+    lines = tuple(Line(part, values) for part, values in percent_of(track.shape_changes).items())
+    return [
+        frame_plot(
+            "shape", "How the hand's shape was refined", track.frame, [Panel("%", lines, from_zero=False)], track.lost,
+            "Change since the start, in views that tell something of the shape.",
+        )
     ]  # fmt: skip
 
 
