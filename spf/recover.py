@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
 _REGIONS = 2  # of the frame, the nearest, that are looked at
 _SEEN = 0.3  # presence of a hand, in the network's eyes, from which it is looked for in a place
-_JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose
+_JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose …
+_BENT = 0.1  # … and digits that are bent otherwise by a radian on the average
 
 
 def recover(
@@ -109,7 +110,8 @@ def glance(
 def unlikely(pose: Array, last: Array, within: float) -> float:
     """What a pose is charged for being elsewhere, and held otherwise, than the last one (D,); both by the camera's axes."""
     turn = Rotation.from_matrix(rotation_about(pose[3:6]) @ rotation_about(last[3:6]).T).magnitude()
-    return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi)
+    bent = np.abs(pose[6:] - last[6:]).mean()
+    return float(_JUMP * np.linalg.norm(pose[:3] - last[:3]) / within + _TURN * turn / np.pi + _BENT * bent)
 
 
 def _strange(network: Network | None, frame: Frame, hand: Hand, pose: Array) -> float:
@@ -145,4 +147,11 @@ def _places(network: Network | None, frame: Frame, hand: Hand, last: Array) -> I
         for seeds in sorted(seen, key=lambda seeds: float(np.linalg.norm(seeds.poses[0, :3] - last[:3]))):
             looked = observe(frame, seeds.poses[0, :3], reach_of(hand))
             if not looked.is_empty:
-                yield _Place(looked, region.points, seeds)
+                yield _Place(looked, region.points, _with_memory(seeds, last))
+
+
+def _with_memory(seeds: Seeds, last: Array) -> Seeds:
+    """Seeds, and the same palms with the digits of the last pose: of what is hidden, only memory tells."""
+    remembered = seeds.poses.copy()
+    remembered[:, 6:] = last[6:]
+    return Seeds(np.concatenate([seeds.poses, remembered]), np.tile(seeds.scales, 2), seeds.presence)

@@ -11,6 +11,7 @@ from spf.learned.guesses import Guess, extent_of, guesses
 from spf.learned.network import available_network
 from spf.locate import _ABSENT, _AROUND, _LOOKS, _looks, seen_at, strangeness_to
 from spf.prepare import prepare
+from spf.recover import _places, unlikely
 from spf.synthetic import synthesise
 from spf.synthetic.clutter import _forearm_mesh
 from spf.track import begin, track_frame
@@ -104,3 +105,29 @@ def test_a_hand_is_lost_where_the_network_sees_none_however_well_it_is_rendered(
     lost, golden = run()
     assert lost == [False, False, True, True]
     assert golden < 0.3
+
+
+def test_a_pose_whose_digits_are_as_they_were_is_the_likelier_one():
+    hand = load_hand("right")
+    last = hand.constrain(hand.neutral_pose())
+    bent = last.copy()
+    bent[hand.dof_names.index("ring_pip_flexion")] += 1.0
+    assert unlikely(last, last, 0.2) == 0.0
+    assert 0.0 < unlikely(bent, last, 0.2) < 0.02
+    bent[6:] += 0.5
+    assert unlikely(bent, last, 0.2) > 0.04
+
+
+@needs_network
+def test_a_hand_is_looked_for_with_the_digits_that_it_was_lost_with_too():
+    session = synthesise(session_settings("medium", 4, 2))
+    frame, hand, last = session[1], session.hand, session.hand.neutral_pose()
+    last[:3], last[6:] = session[0].truth.pose[:3], 0.2
+    places = list(_places(available_network()[0], frame, hand, last))
+    assert places
+    for place in places:
+        own, remembered = np.split(place.seeds.poses, 2)
+        np.testing.assert_array_equal(own[:, :6], remembered[:, :6])
+        np.testing.assert_array_equal(remembered[:, 6:], np.broadcast_to(last[6:], remembered[:, 6:].shape))
+        assert np.abs(own[:, 6:] - last[6:]).max() > 0.05
+        assert len(place.seeds.scales) == len(place.seeds.poses)

@@ -10,6 +10,7 @@ from app.results import Summary
 from app.state import State
 from app.views.transport import ranges
 from spf.hand import HandShape
+from spf.hand.shape import UNCHANGED
 from spf.initialise import Start
 from spf.sessions import open_session
 
@@ -29,7 +30,7 @@ def state(sample):
         nan = float("nan")
         state.lane.results._summaries[i] = Summary(
             i, np.zeros((21, 3)), lost, i in (4, 7), nan, nan, False, "", nan if lost else error / 10, nan,
-            error / 1000, 0.1, None,
+            error / 1000, 0.1, UNCHANGED, None,
         )  # fmt: skip
     return state
 
