@@ -23,7 +23,6 @@ from spf.hand.model import DOF_NAMES, Hand
 from spf.hand.shape import UNCHANGED, HandShape, varied
 from spf.kernels.cost import Spheres
 from spf.optimisers.smd import SmdSettings, optimise
-from spf.parallel import map_threads
 from spf.shape_equations import BACKGROUND, POOL, View, equations_of, nudged
 
 __all__ = ["Refinement", "agreement", "is_due", "modelled", "refined", "unrefined"]
@@ -135,7 +134,7 @@ def _gain(shape: HandShape, candidate: HandShape, view: View, seed: list[int], *
         end, *_ = optimise(problem, SmdSettings(rounds=_ROUNDS), rng, view.pose)
         return float(golden(problem, np.stack([view.pose, end]))[0].min())
 
-    now, then = map_threads(explained, [shape, candidate])
+    now, then = explained(shape), explained(candidate)
     return (then - now) / max(now, _LEAST_GOLDEN)
 
 

@@ -44,7 +44,7 @@ class ParticleTable(Follower):
             theme="simple", stylesheets=[_SMALL], sizing_mode="stretch_both", margin=0, pagination=None,  # it scrolls
             widths={heading: width for heading, _, width in _COLUMNS.values()},
             formatters={
-                heading: NumberFormatter(format=f"{0:.{decimals}f}", nan_format="–", text_align="right")
+                heading: NumberFormatter(format=f"{0:.{decimals}f}", nan_format="–")
                 for heading, decimals, _ in _COLUMNS.values()
                 if decimals is not None
             },
