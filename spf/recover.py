@@ -22,6 +22,7 @@ __all__ = ["glance", "recover", "unlikely"]
 
 Array = NDArray[np.float64]
 _FORGOTTEN = 30.0  # frames after which how a lost hand was held counts half
+_SEARCHED = 16  # lost frames, at least one of which is searched
 _REGIONS = 2  # of the frame, the nearest, that are looked at
 _SEEN = 0.3  # presence of a hand, in the network's eyes, from which it is looked for in a place
 _JUMP, _TURN = 0.1, 0.2  # golden energy that a jump as far as can be, and a turn by 180°, weigh against a pose …
@@ -48,7 +49,8 @@ def recover(
         better: the same of a pose that is what the network sees there, for which it is enough to be better than the last.
         last: (D,) the pose that it was lost in, relative to the camera's axes.
         within: m that its palm can have moved since.
-        missing: frames since it was lost: the longer, the less counts how it was held.
+        missing: frames since it was lost: the longer, the less counts how it was held. A search takes many frames' time: the
+            first frame is searched, the second, the fourth, …, and in the others only what the network sees is fitted.
         network: says where in the frame hands are; without it, all that is there is searched, which takes longer.
         rng: randomness.
 
@@ -69,13 +71,18 @@ def recover(
                 rated.append((charged, pose))
         return min(rated, key=lambda item: item[0])[1] if rated else None
 
+    thorough = network is None or missing & (missing - 1) == 0 or missing % _SEARCHED == 0
     near = observe(frame, last[:3], reach_of(hand))
-    if not near.is_empty:
+    if thorough and not near.is_empty:
         pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
         if pose is not None:
             return pose
     for place in _places(network, frame, hand, last):
-        pose = believed(locate(hand, place.observation, place.points, settings, rng, place.seeds))
+        if thorough or place.seeds is None:
+            found = locate(hand, place.observation, place.points, settings, rng, place.seeds)
+        else:
+            found = polished(hand, place.observation, place.seeds.poses, rng)
+        pose = believed(found)
         if pose is not None:
             return pose
     return None

@@ -5,13 +5,13 @@ import pytest
 
 from benchmarks.holds.kidnaps import kidnapped
 from benchmarks.holds.sessions import session_settings
-from spf.hand.kinematics import joints_of, pose_hand
+from spf.hand.kinematics import joints_of, pose_hand, relative_to_camera
 from spf.hand.model import load_hand
 from spf.learned.guesses import Guess, extent_of, guesses
 from spf.learned.network import available_network
 from spf.locate import _ABSENT, _AROUND, _LOOKS, _looks, seen_at, strangeness_to
 from spf.prepare import prepare
-from spf.recover import _places, unlikely
+from spf.recover import _places, recover, unlikely
 from spf.synthetic import synthesise
 from spf.synthetic.clutter import _forearm_mesh
 from spf.track import begin, track_frame
@@ -131,3 +131,25 @@ def test_a_hand_is_looked_for_with_the_digits_that_it_was_lost_with_too():
         np.testing.assert_array_equal(remembered[:, 6:], np.broadcast_to(last[6:], remembered[:, 6:].shape))
         assert np.abs(own[:, 6:] - last[6:]).max() > 0.05
         assert len(place.seeds.scales) == len(place.seeds.poses)
+
+
+@needs_network
+@pytest.mark.parametrize(("missing", "searched"), [(1, True), (2, True), (3, False), (5, False), (8, True), (48, True)])
+def test_a_lost_hand_is_searched_for_in_some_frames_and_looked_for_in_all(missing, searched, monkeypatch, rng):
+    session = kidnapped(synthesise(session_settings("medium", 4, 8)), 3, np.random.default_rng([4, 11]))
+    before, frame, hand = session[2].truth, session[3], session.hand
+    asked = []
+
+    def counted(*arguments):
+        asked.append(arguments)
+        return []
+
+    monkeypatch.setattr("spf.recover.locate", counted)
+    last = relative_to_camera(before.pose, before.orientation)
+    found = recover(frame, hand, 0.5, 0.5, last, 0.5, missing, available_network()[0], rng)
+    if searched:
+        assert asked
+        assert found is None
+    else:
+        assert not asked
+        assert np.linalg.norm(joints_of(hand, found) - frame.truth.joints, axis=1).mean() < 0.02
