@@ -139,7 +139,7 @@ class _Job(NamedTuple):
 
 def _preview(job: _Job, observation: Observation) -> Preview:
     base, settings = job.base, job.settings
-    info, how = base.result.info, base.tracking
+    info, how = base.result.info, base.shaped
     assert info is not None
     assert isinstance(settings, CostSettings)
     assert isinstance(how.settings, CostSettings)
@@ -167,7 +167,7 @@ def _preview(job: _Job, observation: Observation) -> Preview:
 
 
 def _told(base: Entry, entry: Entry) -> str:
-    was, now, how = base.result.info, entry.result.info, base.tracking
+    was, now, how = base.result.info, entry.result.info, base.shaped
     assert was is not None
     assert now is not None
     apart = joints_of(how.hand, was.estimate, was.reference) - joints_of(how.hand, now.estimate, now.reference)
@@ -181,7 +181,7 @@ def _told(base: Entry, entry: Entry) -> str:
 
 def _around(job: _Job, entry: Entry, observation: Observation) -> Landscape:
     """The landscape around the estimate, wide enough for the samples."""
-    info, how = entry.result.info, entry.tracking
+    info, how = entry.result.info, entry.shaped
     assert info is not None
     samples = np.concatenate([info.predicted, info.optimised])
     across = []

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.budget import SHARED, Budget
 from spf.frame import Camera, Frame
+from spf.hand.model import Hand
 from spf.lens import seen_through
 from spf.locate import reach_of
 from spf.observation import Observation, observe
@@ -31,7 +32,7 @@ class Entry(NamedTuple):
     Attributes:
         result: of the frame, without its observation.
         state: after it, to track on from here.
-        tracking: what it was tracked with.
+        tracking: what it was tracked with; the hand is the start's.
         seen: what was taken for the hand; None while nothing was.
         before: the state that the frame was tracked from, to track it once more.
     """
@@ -41,6 +42,16 @@ class Entry(NamedTuple):
     tracking: Tracking
     seen: Seen | None
     before: TrackState
+
+    @property
+    def shaped(self) -> Tracking:
+        """What the frame was tracked with, with the hand in the shape that it had by then."""
+        return reshaped(self.tracking, self.result.shape_change)
+
+    @property
+    def hand(self) -> Hand:
+        """The hand in that shape."""
+        return self.shaped.hand
 
 
 class Seen(NamedTuple):
@@ -256,14 +267,12 @@ def entry_of(result: TrackedFrame, state: TrackState, tracking: Tracking, before
         mask = observation.depth > 0
         depths = observation.depth[mask]
         seen = Seen(observation.top, observation.left, observation.camera, np.packbits(mask), depths)
-    return Entry(
-        result._replace(info=info, observation=None), state, reshaped(tracking, result.shape_change), seen, before
-    )
+    return Entry(result._replace(info=info, observation=None), state, tracking, seen, before)
 
 
 def seen_again(entry: Entry, frame: Frame) -> Observation:
     """Return what was looked at in a tracked frame."""
-    how, place = entry.tracking, entry.result.place
+    how, place = entry.shaped, entry.result.place
     assert place is not None
     return observe(seen_through(frame, how.start.shape.lens), place, reach_of(how.hand))
 

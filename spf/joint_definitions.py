@@ -8,7 +8,6 @@ truth. They are fractions of the length of the hand, for hands differ in size; t
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -20,7 +19,15 @@ from spf.frame import JOINT_NAMES
 from spf.hand.kinematics import PosedHand
 from spf.hand.model import MIRROR, Hand
 
-__all__ = ["MODEL", "corrected_joints", "definitions", "offsets_of", "own_offsets", "relative_offsets"]
+__all__ = [
+    "MODEL",
+    "corrected_joints",
+    "definitions",
+    "nearest_joints",
+    "offset_axes",
+    "offsets_of",
+    "relative_offsets",
+]
 
 Array = NDArray[np.float64]
 MODEL = "model"  # the project's own definition, which needs no correction
@@ -58,31 +65,35 @@ def corrected_joints(hand: Hand, posed: PosedHand, offsets: Array) -> Array:
         posed: its pose.
         offsets: (21, 3) from :func:`offsets_of`.
     """
-    mirror = MIRROR if hand.side == "left" else np.ones(3)
-    rotations = posed.frames[hand.joint_bone][:, :, :3]
-    return posed.joints + np.einsum("jik,jk->ji", rotations, offsets * mirror * hand.length)
+    return posed.joints + np.einsum("jik,jk->ji", offset_axes(hand, posed), offsets)
 
 
 def relative_offsets(hand: Hand, posed: PosedHand, joints: Array) -> Array:
     """Return by how much given joints (21, 3) differ from the model's, in the units of :func:`offsets_of`."""
+    return np.asarray(np.einsum("jik,ji->jk", offset_axes(hand, posed), joints - posed.joints) / hand.length**2)
+
+
+def offset_axes(hand: Hand, posed: PosedHand) -> Array:
+    """Return the axes (21, 3, 3) that offsets are along, in the camera's frame and as long as the hand, m."""
     mirror = MIRROR if hand.side == "left" else np.ones(3)
-    rotations = posed.frames[hand.joint_bone][:, :, :3]
-    return np.asarray(np.einsum("jik,ji->jk", rotations, joints - posed.joints) * mirror / hand.length)
+    return np.asarray(posed.frames[hand.joint_bone][:, :, :3] * mirror * hand.length)
 
 
-def own_offsets(hands: Sequence[tuple[Hand, PosedHand]], joints: Array) -> Array:
-    """Return the constant offsets (21, 3) that bring the joints of a track nearest to a truth, whatever that marks.
+def nearest_joints(axes: Array, joints: Array, truth: Array, held: NDArray[np.bool_]) -> Array:
+    """Return the joints of a track with the constant offsets that bring them nearest to a truth, whatever that marks.
 
     A truth whose joints are defined otherwise, or whose hand has other proportions, is compared with a track by them: they
-    take away what is the same in all frames. They are fitted to the very frames that they are used in.
+    take away what is the same in all frames. They are medians over the very frames that they are used in.
 
     Args:
-        hands: N, of a track, with their poses.
-        joints: (N, 21, 3) m, true joints; NaN where one is not known.
+        axes: (N, 21, 3, 3) from :func:`offset_axes`, of the frames of a track.
+        joints: (N, 21, 3) m, of the track.
+        truth: (N, 21, 3) m; NaN where a joint is not known.
+        held: (N,) frames that the offsets are fitted to.
 
     Returns:
-        medians over the frames; zeros for a joint that is never known.
+        (N, 21, 3) m; joints that are never known stay where they are.
     """
-    relative = [relative_offsets(hand, posed, own) for (hand, posed), own in zip(hands, joints, strict=True)]
-    known = np.ma.masked_invalid(np.reshape(relative, (-1, *joints.shape[1:])))
-    return np.asarray(np.ma.median(known, axis=0).filled(0.0))
+    along = np.einsum("njik,nji->njk", axes, truth - joints) / np.maximum((axes**2).sum(axis=2), 1e-12)
+    offsets = np.ma.median(np.ma.masked_invalid(along[held]), axis=0).filled(0.0)
+    return np.asarray(joints + np.einsum("njik,jk->nji", axes, offsets))

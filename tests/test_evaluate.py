@@ -10,7 +10,7 @@ from spf.evaluate.depth_agreement import surface_distances
 from spf.frame import JOINT_NAMES
 from spf.hand import load_hand
 from spf.hand.kinematics import pose_hand
-from spf.joint_definitions import corrected_joints, offsets_of, relative_offsets
+from spf.joint_definitions import corrected_joints, nearest_joints, offset_axes, offsets_of, relative_offsets
 from spf.manifest import Plan, manifest_of
 from spf.prepare import prepare
 from spf.runs import Run
@@ -156,6 +156,20 @@ def test_offsets_of_a_left_hand_are_the_mirror_image():
     np.testing.assert_allclose(moved["left"] * [-1, 1, 1], moved["right"], atol=1e-3)
 
 
+def test_constant_offsets_are_found_from_a_track_whatever_else_is_wrong(rng):
+    hand = load_hand("left")
+    posed = [pose_hand(hand, pose) for pose in hand.constrain(0.2 * rng.normal(size=(9, hand.dofs)))]
+    offsets = 0.05 * rng.normal(size=(21, 3))
+    marked = np.stack([corrected_joints(hand, each, offsets) for each in posed])
+    axes, joints = (np.stack(part) for part in zip(*((offset_axes(hand, p), p.joints) for p in posed), strict=True))
+    truth = marked.copy()
+    truth[2] += 0.5  # one frame in which another thing was tracked
+    truth[5, 3], truth[:, 8] = np.nan, np.nan
+    found = nearest_joints(axes, joints, truth, np.ones(9, bool))
+    marked[:, 8] = joints[:, 8]  # is never known
+    np.testing.assert_allclose(found, marked, atol=1e-6)
+
+
 def test_the_models_own_joints_need_no_correction_and_unknown_ones_have_none():
     assert not offsets_of("model").any()
     assert offsets_of("somebody's") is None
@@ -211,6 +225,7 @@ def test_a_definition_without_offsets_is_said_to_be_raw(clean):
     other = dataclasses.replace(clean, joint_definition="nyu")
     measures = evaluate_run(run, other)
     assert measures["mean_joint_error_mm"] == measures["mean_joint_error_raw_mm"]
+    assert measures["mean_joint_error_own_offsets_mm"] == pytest.approx(0.0, abs=1e-6)
     assert measures["correction"].startswith("none fitted")
 
 

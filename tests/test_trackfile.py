@@ -12,13 +12,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from spf.errors import RunError
+from spf.hand.kinematics import joints_of
+from spf.hand.shape import SHAPE_PARAMETERS
 from spf.manifest import Plan, manifest_of, plan_of
 from spf.prepare import prepare
 from spf.runs import RunWriter, check_free, read_run, reopen_session, track_plan
 from spf.sessions import open_session, write_session
 from spf.synthetic import SyntheticSettings, synthesise
 from spf.trackers import make_settings
-from spf.trackfile import joined, rows_of, track_of
+from spf.trackfile import joined, read_track, rows_of, track_of
 
 FRAMES = 40
 COLUMNS = ("frame", "lost", "recovered", "poses", "references", "joints", "log_likelihood", "ess", "golden", "overlap")
@@ -190,3 +192,25 @@ def test_a_long_run_takes_little_memory(kept, tmp_path):
             tracemalloc.stop()
     assert kept_bytes < 2000 * 1300
     assert len(read_run(tmp_path / "run").track) == 2010
+
+
+def test_the_hand_of_a_frame_has_the_shape_that_it_was_tracked_with(kept):
+    run = read_run(kept)
+    last, changes = len(run.track) - 1, run.track.shape_changes
+    np.testing.assert_array_equal(changes[0], np.zeros(len(SHAPE_PARAMETERS)))
+    assert changes[last].any()  # a shape that was refined on the way
+    for row in (0, last):
+        hand = run.hand_at(row)
+        joints = joints_of(hand, run.track.poses[row], run.track.references[row])
+        np.testing.assert_allclose(joints, run.track.joints[row], atol=1e-9)
+
+
+def test_a_track_of_an_older_build_is_read(kept, tmp_path):
+    table = pq.read_table(kept / "track.parquet")
+    newer = [name for name in table.column_names if name == "winner" or name.startswith("shape_")]
+    assert len(newer) == 1 + len(SHAPE_PARAMETERS)
+    pq.write_table(table.drop_columns(newer), tmp_path / "track.parquet")
+    track = read_track(tmp_path / "track.parquet")
+    assert not track.shape_changes.any()
+    assert set(track.winner) == {""}
+    np.testing.assert_array_equal(track.poses, read_run(kept).track.poses)

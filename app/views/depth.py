@@ -98,7 +98,7 @@ def around_joints(entry: Entry, frame: Frame) -> NDArray[np.float64] | None:
 
     None where the hand is lost, and of a tracker whose uncertainty is not known.
     """
-    info, tracking = entry.result.info, entry.tracking
+    info, tracking = entry.result.info, entry.shaped
     if info is None or not isinstance(tracking.settings, SpfSettings):
         return None
     said = uncertainty_of(tracking.hand, seen_again(entry, frame), info, tracking.settings)

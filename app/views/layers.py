@@ -92,7 +92,7 @@ def _hands(entry: Entry, info: StepInfo, shown: Shown, drawn: NDArray[np.intp], 
         count = len(both.meshes) // 2 if len(info.optimised) else len(both.meshes)
         parts = {"predicted": both.meshes[:count], "optimised": both.meshes[count:]}
         return Scene(meshes=tuple(mesh for half in halves for mesh in parts[half]))
-    hand, scale = entry.tracking.hand, scale_of(entry, shown.colouring)
+    hand, scale = entry.hand, scale_of(entry, shown.colouring)
     assert scale is not None
     meshes = []
     for half in halves:
@@ -114,7 +114,7 @@ def _value(entry: Entry, info: StepInfo, colouring: str, sample: int, vertices: 
     assert entry.seen is not None
     points = entry.seen.points[:: max(1, len(entry.seen.points) // _MOST_POINTS)]
     # The median, since the points of the forearm, which the model lacks, are far from every particle.
-    return 1000 * float(np.median(distances_to_surface(points, vertices, entry.tracking.hand.faces)))
+    return 1000 * float(np.median(distances_to_surface(points, vertices, entry.hand.faces)))
 
 
 def _colour(value: float, scale: Scale) -> tuple[float, float, float]:
@@ -127,7 +127,7 @@ def _colour(value: float, scale: Scale) -> tuple[float, float, float]:
 def _residuals(entry: Entry, info: StepInfo) -> Scene:
     """The observed points, each the redder the farther it is from the estimated hand."""
     assert entry.seen is not None
-    hand, points = entry.tracking.hand, entry.seen.points
+    hand, points = entry.hand, entry.seen.points
     vertices = pose_hand(hand, info.estimate, info.reference).vertices
     far = np.minimum(distances_to_surface(points, vertices, hand.faces), RESIDUAL_FULL)
     return Scene(points=reconstruction_scene(vertices, hand.faces, points=points, residuals=far).points)

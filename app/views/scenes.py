@@ -40,7 +40,7 @@ _PATH_JOINTS = np.array([0, 4, 8, 12, 16, 20])  # wrist and fingertips
 
 def reconstruction_of(entry: Entry, colour: Colour = HAND) -> Scene | None:
     """Return the estimated hand among the observed points; None while it is lost."""
-    info, hand = entry.result.info, entry.tracking.hand
+    info, hand = entry.result.info, entry.hand
     if info is None or entry.seen is None:
         return None
     vertices = pose_hand(hand, info.estimate, info.reference).vertices
@@ -59,7 +59,7 @@ def drawn_of(info: StepInfo, selected: tuple[int, ...], most: int) -> NDArray[np
 
 def particles_of(entry: Entry, selected: tuple[int, ...] = ()) -> Scene | None:
     """Return particles before and after optimisation, as hands; None while the hand is lost."""
-    info, seen, hand = entry.result.info, entry.seen, entry.tracking.hand
+    info, seen, hand = entry.result.info, entry.seen, entry.hand
     if info is None or seen is None:
         return None
     before, after = info.predicted_weights, info.optimised_weights
@@ -82,7 +82,7 @@ def particles_of(entry: Entry, selected: tuple[int, ...] = ()) -> Scene | None:
 
 def trajectories_of(entry: Entry, selected: tuple[int, ...] = ()) -> Scene | None:
     """Return the paths of wrist and fingertips during optimisation; None when none were recorded."""
-    info, seen, hand = entry.result.info, entry.seen, entry.tracking.hand
+    info, seen, hand = entry.result.info, entry.seen, entry.hand
     if info is None or seen is None or not info.trajectories:
         return None
     after = info.optimised_weights
@@ -112,6 +112,6 @@ def view_of(entries: Iterable[Entry], state: State) -> ViewCamera:
 
 def hand_view(entry: Entry) -> ViewCamera:
     """Return the sensor's view of the estimated hand."""
-    view = ViewCamera.from_sensor(joints_of(entry.tracking.hand, entry.result.pose, entry.result.reference))
+    view = ViewCamera.from_sensor(joints_of(entry.hand, entry.result.pose, entry.result.reference))
     # The skin reaches beyond the joints, and the particles beyond the estimate.
     return view._replace(extent=1.25 * view.extent)

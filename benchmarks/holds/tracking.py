@@ -13,10 +13,9 @@ from benchmarks.holds.sessions import KINDS, Source, open_source
 from spf.evaluate import agreement_with_depth
 from spf.evaluate.contradictions import CONTRADICTED, label_energy
 from spf.evaluate.floor import floor_of
-from spf.hand.kinematics import PosedHand, joints_of, pose_hand
-from spf.hand.model import Hand
+from spf.hand.kinematics import joints_of, pose_hand
 from spf.initialise import Start, find_start
-from spf.joint_definitions import corrected_joints, own_offsets
+from spf.joint_definitions import nearest_joints, offset_axes
 from spf.lens import as_seen, as_stated, seen_through
 from spf.prepare import SessionFrames, prepare
 from spf.sessions import Session
@@ -122,8 +121,7 @@ def _tracked(
     rows: dict[str, list[Any]] = {
         "error_mm": [], "largest_mm": [], "lost": [], "golden": [], "iou": [], "seconds": [], "cpu_seconds": []
     }  # fmt: skip
-    hands: list[tuple[Hand, PosedHand]] = []
-    truth: list[Array] = []
+    marks: list[tuple[Array, Array, Array]] = []  # axes of the offsets, joints, truth
     for frame in frames[start.frame :]:
         began = time.process_time()
         state, result = track_frame(tracking, state, frame)
@@ -138,23 +136,21 @@ def _tracked(
         errors = None
         if frame.truth is not None:
             joints = as_stated(joints_of(as_labelled(session, hand), result.pose, result.reference), lens)
-            hands.append((hand, pose_hand(hand, result.pose, result.reference)))
-            truth.append(frame.truth.joints)
+            posed = pose_hand(hand, result.pose, result.reference)
+            marks.append((offset_axes(hand, posed), posed.joints, as_seen(frame.truth.joints, lens)))
             errors = np.linalg.norm(joints - frame.truth.joints, axis=1)
         rows["error_mm"].append(None if errors is None else _mm(errors))
         rows["largest_mm"].append(None if errors is None else round(1e3 * float(np.nanmax(errors)), 3))
     exact = session.hand.length if isinstance(session, SyntheticSession) else None
     ended = {"end_size_ratio": None if exact is None else hand.length / exact}
-    return (
-        rows | ended | {"own_offsets_mm": _nearest(hands, np.array(truth), lens) if exact is None and truth else None}
-    )
+    return rows | ended | {"own_offsets_mm": _nearest(marks, lens) if exact is None and marks else None}
 
 
-def _nearest(hands: list[tuple[Hand, PosedHand]], truth: Array, lens: float) -> list[float]:
+def _nearest(marks: list[tuple[Array, Array, Array]], lens: float) -> list[float]:
     """Errors by frame that remain with the constant offsets that bring this very run nearest to its truth, mm."""
-    own = own_offsets(hands, as_seen(truth, lens))
-    joints = [as_stated(corrected_joints(*each, own), lens) for each in hands]
-    return [_mm(np.linalg.norm(apart, axis=1)) for apart in np.array(joints) - truth]
+    axes, joints, truth = (np.array(part) for part in zip(*marks, strict=True))
+    apart = nearest_joints(axes, joints, truth, np.ones(len(joints), bool)) - truth
+    return [_mm(np.linalg.norm(as_stated(own, lens), axis=1)) for own in apart]
 
 
 def _with_count(asked: Asked, count: int) -> dict[str, str]:

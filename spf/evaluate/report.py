@@ -12,9 +12,8 @@ from spf.evaluate.depth_agreement import agreement_with_depth
 from spf.evaluate.joint_errors import THRESHOLDS, JointMeasures, joint_errors, measure_joints
 from spf.evaluate.losses import count_losses
 from spf.frame import JOINT_NAMES
-from spf.hand.kinematics import PosedHand, pose_hand
-from spf.hand.model import Hand
-from spf.joint_definitions import corrected_joints, offsets_of, own_offsets
+from spf.hand.kinematics import pose_hand
+from spf.joint_definitions import corrected_joints, nearest_joints, offset_axes, offsets_of
 from spf.lens import as_seen, as_stated, seen_through
 from spf.progress import Report
 from spf.runs import Run
@@ -106,11 +105,11 @@ def compare_run(run: Run, session: Session, progress: Report | None = None) -> C
     offsets = np.zeros((len(JOINT_NAMES), 3)) if known is None else known
     track, lens = run.track, run.plan.start.shape.lens
     result = Compared(*(np.full((len(track), *shape), np.nan) for shape in ((21, 3), (21, 3), (21, 3), (), ())))
-    hands: list[tuple[Hand, PosedHand]] = []
+    axes = np.empty((len(track), len(JOINT_NAMES), 3, 3))
     for row, index in enumerate(track.frame):
         frame, hand = session[int(index)], run.hand_at(row)
         posed = pose_hand(hand, track.poses[row], track.references[row])
-        hands.append((hand, posed))
+        axes[row] = offset_axes(hand, posed)
         result.corrected[row] = as_stated(corrected_joints(hand, posed, offsets), lens)
         if frame.truth is not None:
             result.truth[row] = frame.truth.joints
@@ -120,9 +119,8 @@ def compare_run(run: Run, session: Session, progress: Report | None = None) -> C
             )
         if progress is not None:
             progress("Comparing with the depth", (row + 1) / len(track))
-    held = np.flatnonzero(~track.lost)
-    own = own_offsets([hands[row] for row in held], as_seen(result.truth[held], lens))
-    result.nearest[:] = [as_stated(corrected_joints(*each, own), lens) for each in hands]
+    joints, truth = as_seen(track.joints, lens), as_seen(result.truth, lens)
+    result.nearest[:] = as_stated(nearest_joints(axes, joints, truth, ~track.lost), lens)
     return result
 
 
