@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 
 from spf.errors import RunError
 from spf.hand.model import Hand
-from spf.hand.shape import varied
+from spf.hand.shape import HandShape, varied
 from spf.manifest import Plan, plan_of, read_manifest, write_manifest
 from spf.progress import Report, silent
 from spf.refine import modelled
@@ -53,7 +53,11 @@ class Run(NamedTuple):
 
     def hand_at(self, row: int) -> Hand:
         """Return the hand that a row of the track was tracked with: its shape may have been refined on the way."""
-        return modelled(varied(self.plan.start.shape, self.track.shape_changes[row]))[0]
+        return modelled(self.shape_at(row))[0]
+
+    def shape_at(self, row: int) -> HandShape:
+        """Return the shape of that hand."""
+        return varied(self.plan.start.shape, self.track.shape_changes[row])
 
 
 def begin_late(plan: Plan, frame: int, time: float) -> tuple[Tracking, TrackState]:

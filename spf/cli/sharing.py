@@ -11,7 +11,7 @@ import typer
 from spf.cli.console import check_output, progress_bar
 from spf.cli.sessions import Force
 from spf.errors import RunError, SettingError
-from spf.export import VIEWS, View, write_film, write_picture, write_table
+from spf.export import VIEWS, View, write_film, write_hand, write_picture, write_table
 from spf.export.tables import TABLES
 from spf.render import Renderer
 from spf.report import write_report
@@ -68,10 +68,13 @@ def export(
             "--output",
             "-o",
             metavar="FILE",
-            help="Its ending says what is written: .csv or .parquet the track, .png or .jpg a picture, .mp4 a film.",
+            help="Its ending says what is written: .csv or .parquet the track, .png or .jpg a picture, .mp4 a film, .json "
+            "the hand as its shape was refined.",
         ),
     ],
-    frame: Annotated[int | None, typer.Option(help="Of a picture: which frame; the first that shows the hand.")] = None,
+    frame: Annotated[
+        int | None, typer.Option(help="Of a picture: which frame; the first that shows the hand. Of a hand: the last.")
+    ] = None,
     view: Annotated[str, typer.Option(help=f"Of a picture or film: {', '.join(VIEWS)}.")] = "sensor",
     azimuth: Annotated[float, typer.Option(help="Degrees to the right of the view.")] = 0.0,
     elevation: Annotated[float, typer.Option(help="Degrees above the view.")] = 0.0,
@@ -83,7 +86,7 @@ def export(
     session: MovedSession = None,
     force: Force = False,
 ) -> None:
-    """Write a run for other programs: its track, a picture of a frame, or a film.
+    """Write a run for other programs: its track, a picture of a frame, a film; or its hand, for ``spf track --hand``.
 
     Examples:
 
@@ -92,16 +95,22 @@ def export(
         spf export runs/first -o frame.png --frame 30 --view side
 
         spf export runs/first -o run.mp4
+
+        spf export runs/first -o hand.json
     """
     ending = output.suffix.lower()
-    if ending not in (*TABLES, *_PICTURES, ".mp4"):
-        known = ", ".join((*TABLES, *_PICTURES, ".mp4"))
+    if ending not in (*TABLES, *_PICTURES, ".mp4", ".json"):
+        known = ", ".join((*TABLES, *_PICTURES, ".mp4", ".json"))
         raise SettingError(f"The file's ending says what is written, one of {known}; '{output.name}' has none of them.")
     check_output(output, force)
     run = read_run(directory)
     if ending in TABLES:
         write_table(run.track, output)
         print(f"Wrote {len(run.track)} frames to {output}.")
+        return
+    if ending == ".json":
+        shown = write_hand(run, output, frame)
+        print(f"Wrote the hand of frame {shown} to {output}: 'spf track --hand {output}' begins with it.")
         return
     side = _view(view, azimuth, elevation, zoom)
     with progress_bar() as progress, reopen_session(run.manifest, session, progress) as opened, Renderer() as renderer:

@@ -11,6 +11,7 @@ import pytest
 
 from spf import __version__
 from spf.cli import execute
+from spf.hand.shape import read_hand_shape
 from spf.presets import Presets
 from spf.runs import read_run
 from spf.sessions import MCAPWriter, Note, open_session, write_session
@@ -160,6 +161,8 @@ def test_report_and_export(run, tmp_path, capsys):
     assert "Written without the session" in page.read_text()
     assert execute(["export", str(run), "-o", str(table)]) == 0
     assert len(table.read_text().splitlines()) == 11
+    assert execute(["export", str(run), "-o", str(tmp_path / "hand.json")]) == 0
+    assert read_hand_shape(tmp_path / "hand.json") == read_run(run).shape_at(9)
 
 
 def test_doctor(monkeypatch, capsys):

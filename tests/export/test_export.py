@@ -1,5 +1,7 @@
 """A run as files: every value of the track, pictures with the hand in them, a film with all frames."""
 
+import dataclasses
+
 import cv2
 import numpy as np
 import pyarrow.csv
@@ -7,7 +9,8 @@ import pyarrow.parquet
 import pytest
 
 from spf.errors import RunError, SettingError
-from spf.export import VIEWS, write_film, write_picture, write_table
+from spf.export import VIEWS, write_film, write_hand, write_picture, write_table
+from spf.hand.shape import SHAPE_PARAMETERS, read_hand_shape
 from spf.trackfile import read_track
 from tests.made_runs import LOST, WORST, made_run, made_session
 
@@ -32,6 +35,21 @@ def test_a_table_holds_the_track_in_both_formats(run, tmp_path):
     assert [text.column("ess")[i].as_py() for i in LOST] == [None, None]
     np.testing.assert_array_equal(read_track(tmp_path / "track.parquet").poses, run.track.poses)
     assert {path.name for path in tmp_path.iterdir()} == {"track.csv", "track.parquet"}
+
+
+def test_a_hand_is_written_in_the_shape_of_a_frame(run, tmp_path):
+    changes = np.zeros((len(run.track), len(SHAPE_PARAMETERS)))
+    changes[3:, 0], changes[-1, 0] = 0.05, 0.1
+    refined = run._replace(track=dataclasses.replace(run.track, shape_changes=changes))
+    begun = run.plan.start.shape
+    assert write_hand(refined, tmp_path / "hand.json") == run.track.frame[-1]
+    assert read_hand_shape(tmp_path / "hand.json").scale == pytest.approx(begun.scale * np.exp(0.1))
+    assert write_hand(refined, tmp_path / "hand.json", 0) == 0
+    assert read_hand_shape(tmp_path / "hand.json") == begun
+    lost = refined._replace(track=dataclasses.replace(run.track, lost=np.ones(len(run.track), bool)))
+    with pytest.raises(RunError, match="held in no frame"):
+        write_hand(lost, tmp_path / "other.json")
+    assert {path.name for path in tmp_path.iterdir()} == {"hand.json"}
 
 
 def test_another_ending_is_refused(run, session, tmp_path, renderer):
