@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 #: (sensors widen it), and observed pixels that are matched.
 BACKGROUND, POOL = 0.2, 250
 _DELTA = 1e-3  # of the numerical derivatives
+_PIECE = 128
 _DAMPING, _LEAST = 1e-3, 1.0  # of the eliminated poses: relative, and absolute
 
 
@@ -115,8 +116,15 @@ def equations_of(problem: Problem, pose: Array, hands: list[Hand]) -> ShapeEquat
     ends = found.vertices[found.matches[matched]] - arrays.points[problem.data_pool[matched]]
     gain = weights.coverage * problem.settings.points / max(len(found.matches), 1) / LENGTH**2
     add(found.matches[matched], ends, gain / (1 + (ends**2).sum(axis=1) / weights.pull**2), None)
-    a, b = np.concatenate(rows), np.concatenate(right)
-    return _without_pose(a.T @ a, a.T @ b, len(pose))
+    products = _products(np.column_stack([np.concatenate(rows), np.concatenate(right)]))
+    return _without_pose(products[:-1, :-1], products[:-1, -1], len(pose))
+
+
+def _products(rows: Array) -> Array:
+    """rowsᵀ rows, in pieces too small for the threads of BLAS, which would go on spinning in the way of the next frames."""
+    padded = np.zeros((-(-len(rows) // _PIECE), _PIECE, rows.shape[1]))
+    padded.reshape(-1, rows.shape[1])[: len(rows)] = rows
+    return np.asarray(np.matmul(padded.transpose(0, 2, 1), padded).sum(axis=0))
 
 
 def _without_pose(hessian: Array, gradient: Array, dofs: int) -> ShapeEquations:

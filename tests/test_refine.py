@@ -8,7 +8,7 @@ from spf.hand.kinematics import joints_of
 from spf.hand.shape import SHAPE_PARAMETERS, UNCHANGED, percent_of, varied
 from spf.prepare import prepare
 from spf.refine import agreement, modelled, refined, unrefined
-from spf.shape_equations import View
+from spf.shape_equations import View, _products
 from spf.statefile import read_states, write_states
 from spf.synthetic import SyntheticSettings, synthesise
 from spf.track import begin, reshaped, track_frame
@@ -137,6 +137,12 @@ def test_samples_that_disagree_are_no_view(session):
     scattered = info.optimised.copy()
     scattered[:, 0] += np.linspace(-0.05, 0.05, len(scattered))
     assert agreement(tracking.hand, info._replace(optimised=scattered, predicted=scattered)) == 0.0
+
+
+def test_the_products_in_pieces_are_the_products(rng):
+    for count in (1, 128, 700):
+        rows = rng.normal(size=(count, 36))
+        np.testing.assert_allclose(_products(rows), rows.T @ rows, rtol=1e-9, atol=1e-9)
 
 
 def test_the_papers_filter_refines_nothing():
