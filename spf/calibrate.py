@@ -101,12 +101,13 @@ def fit_shape(
     settings, descent = CostSettings(background=BACKGROUND), SmdSettings(rounds=4)
     report, parameters = progress or silent, _parameters(first)
     usual = HandShape(first.side, mesh=first.mesh, lens=first.lens)
-    hand = varied(usual, parameters).hand()
+    shape = varied(usual, parameters)
+    hand = shape.hand()
     count = len(SHAPE_PARAMETERS) if refine else 1
     best = first, views, _mean_golden(views, first.hand(), settings, rng)
     for done in range(iterations):
         report("Fitting the hand's shape", done / iterations)
-        hands = nudged(varied(usual, parameters), count)
+        hands = nudged(shape, count)
         seeds, spheres = rng.spawn(len(views)), digit_spheres(hand)
         problems = [
             make_problem(hand, view.observation, settings, view.reference, seed, spheres, pool=POOL)

@@ -65,12 +65,12 @@ def corrected_joints(hand: Hand, posed: PosedHand, offsets: Array) -> Array:
         posed: its pose.
         offsets: (21, 3) from :func:`offsets_of`.
     """
-    return posed.joints + np.einsum("jik,jk->ji", offset_axes(hand, posed), offsets)
+    return _moved(offset_axes(hand, posed), posed.joints, offsets)
 
 
 def relative_offsets(hand: Hand, posed: PosedHand, joints: Array) -> Array:
     """Return by how much given joints (21, 3) differ from the model's, in the units of :func:`offsets_of`."""
-    return np.asarray(np.einsum("jik,ji->jk", offset_axes(hand, posed), joints - posed.joints) / hand.length**2)
+    return _along(offset_axes(hand, posed), joints - posed.joints)
 
 
 def offset_axes(hand: Hand, posed: PosedHand) -> Array:
@@ -94,6 +94,15 @@ def nearest_joints(axes: Array, joints: Array, truth: Array, held: NDArray[np.bo
     Returns:
         (N, 21, 3) m; joints that are never known stay where they are.
     """
-    along = np.einsum("njik,nji->njk", axes, truth - joints) / np.maximum((axes**2).sum(axis=2), 1e-12)
-    offsets = np.ma.median(np.ma.masked_invalid(along[held]), axis=0).filled(0.0)
-    return np.asarray(joints + np.einsum("njik,jk->nji", axes, offsets))
+    relative = np.ma.masked_invalid(_along(axes[held], (truth - joints)[held]))
+    return _moved(axes, joints, np.ma.median(relative, axis=0).filled(0.0))
+
+
+def _moved(axes: Array, joints: Array, offsets: Array) -> Array:
+    """Move joints (…, 3) by offsets (…, 3) along their axes (…, 3, 3)."""
+    return np.asarray(joints + np.einsum("...ik,...k->...i", axes, offsets))
+
+
+def _along(axes: Array, differences: Array) -> Array:
+    """Return differences of joints (…, 3) as offsets along their axes (…, 3, 3): what :func:`_moved` undoes."""
+    return np.asarray(np.einsum("...ik,...i->...k", axes, differences) / (axes**2).sum(axis=-2))

@@ -72,15 +72,17 @@ def recover(
         return min(rated, key=lambda item: item[0])[1] if rated else None
 
     thorough = network is None or missing & (missing - 1) == 0 or missing % _SEARCHED == 0
-    near = observe(frame, last[:3], reach_of(hand))
-    if thorough and not near.is_empty:
-        pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
-        if pose is not None:
-            return pose
+    if thorough:
+        near = observe(frame, last[:3], reach_of(hand))
+        if not near.is_empty:
+            pose = believed(locate(hand, near, near.hand_points, settings, rng, around(hand, last, rng)))
+            if pose is not None:
+                return pose
     for place in _places(network, frame, hand, last):
-        if thorough or place.seeds is None:
+        if thorough:
             found = locate(hand, place.observation, place.points, settings, rng, place.seeds)
         else:
+            assert place.seeds is not None
             found = polished(hand, place.observation, place.seeds.poses, rng)
         pose = believed(found)
         if pose is not None:

@@ -18,7 +18,7 @@ from spf.cost.problem import golden, make_problem
 from spf.cost.settings import CostSettings
 from spf.cost.spheres import digit_spheres
 from spf.filters.step import StepInfo
-from spf.hand.kinematics import joints_of
+from spf.hand.kinematics import joints_of_each
 from spf.hand.model import DOF_NAMES, Hand
 from spf.hand.shape import UNCHANGED, HandShape, varied
 from spf.kernels.cost import Spheres
@@ -70,14 +70,14 @@ def unrefined() -> Refinement:
 
 
 def is_due(refinement: Refinement) -> bool:
-    """Tell whether the next frame may be a view."""
-    return refinement.waited + 1 >= _EVERY
+    """Tell whether enough frames have passed for the next view."""
+    return refinement.waited >= _EVERY
 
 
 def agreement(hand: Hand, info: StepInfo) -> float:
     """Say how much a frame counts as a view of the shape: 1 where its samples agree in the joints, 0 where they do not."""
     samples = np.concatenate([info.predicted, info.optimised])
-    joints = np.stack([joints_of(hand, pose, info.reference) for pose in samples])
+    joints = joints_of_each(hand, samples, info.reference)
     weights = np.exp(info.log_weights)
     apart = joints - np.einsum("n,nij->ij", weights, joints)
     scatter = np.sqrt(np.einsum("n,nij->i", weights, apart**2)).mean()

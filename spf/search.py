@@ -180,7 +180,7 @@ def random_digits(hand: Hand, count: int, rng: np.random.Generator) -> Array:
         digits[:, first + 1] = 1.3 * curl + rng.normal(scale=0.2, size=count)
         digits[:, first + 2] = 0.0
         digits[:, first + 3] = 1.6 * curl + rng.normal(scale=0.2, size=count)
-    if hand.dofs > 26:
+    if hand.free_dip:
         digits[:, 20:] = digits[:, [7, 11, 15, 19]] * (2.0 / 3.0)
     return np.clip(digits, limits[:, 0], limits[:, 1])
 
@@ -242,7 +242,7 @@ def _shift_fingers(hand: Hand, digits: Array, turns: Array, rng: np.random.Gener
 def digit_columns(hand: Hand) -> list[list[int]]:
     """Columns of each digit among the digits' angles (the pose without its first six entries)."""
     columns = [[0, 1, 2, 3]] + [list(range(4 + 4 * f, 8 + 4 * f)) for f in range(4)]
-    if hand.dofs > 26:
+    if hand.free_dip:
         for finger in range(4):
             columns[1 + finger].append(20 + finger)
     return columns

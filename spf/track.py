@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from spf.filters.step import State, StepInfo, start_at
 from spf.frame import Frame
 from spf.hand.kinematics import joints_of, relative_to_camera
-from spf.hand.model import DOF_NAMES, Hand
+from spf.hand.model import Hand
 from spf.hand.shape import UNCHANGED, varied
 from spf.initialise import Start
 from spf.kernels.cost import Spheres
@@ -154,7 +154,7 @@ def _restart(tracking: Tracking, pose: Array, reference: Array, time_: float, re
 def reshaped(tracking: Tracking, change: Array) -> Tracking:
     """Return what a frame was tracked with whose hand had another shape (:attr:`TrackedFrame.shape_change`) than the start's."""
     shape = varied(tracking.start.shape, change)
-    hand, spheres = modelled(shape, free_dip=tracking.hand.dofs > len(DOF_NAMES))
+    hand, spheres = modelled(shape, free_dip=tracking.hand.free_dip)
     return tracking._replace(hand=hand, spheres=spheres)
 
 
@@ -340,7 +340,7 @@ def _refined(
     """Refine the hand's shape where the frame is a good view of it: the hand is held, explained as usual, and sure."""
     refinement = state.refinement._replace(waited=state.refinement.waited + 1)
     good = not (new.lost or new.bad or new.doubts) and info.estimate_golden < _believable(state, tracking)
-    if not (getattr(tracking.settings, "refine_shape", False) and good and is_due(state.refinement)):
+    if not (getattr(tracking.settings, "refine_shape", False) and good and is_due(refinement)):
         return refinement
     counts = agreement(tracking.hand, info)
     if not counts:

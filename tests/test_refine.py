@@ -92,9 +92,15 @@ def test_a_frame_is_tracked_again_from_a_state_that_was_kept(session, refined_ru
 
 
 @pytest.fixture(scope="module")
-def views(session):
+def plain_run(session):
+    """With the true shape, which is not refined."""
+    return tracked(session, UNCHANGED, refine_shape=False)
+
+
+@pytest.fixture(scope="module")
+def views(plain_run):
     """Views of tracked poses, with the true shape."""
-    _, frames, _ = tracked(session, UNCHANGED, refine_shape=False)
+    _, frames, _ = plain_run
     return [View(frames[i].observation, frames[i].pose, frames[i].reference) for i in (20, 30, 40)]
 
 
@@ -130,8 +136,8 @@ def test_views_say_in_which_direction_the_shape_is_wrong(session, views):
     assert likeliest[SHAPE_PARAMETERS.index("index")] > 0.02
 
 
-def test_samples_that_disagree_are_no_view(session):
-    tracking, frames, _ = tracked(session, UNCHANGED, refine_shape=False)
+def test_samples_that_disagree_are_no_view(plain_run):
+    tracking, frames, _ = plain_run
     info = frames[30].info
     assert agreement(tracking.hand, info) > 0.2
     scattered = info.optimised.copy()

@@ -136,14 +136,15 @@ def _tracked(
         errors = None
         if frame.truth is not None:
             joints = as_stated(joints_of(as_labelled(session, hand), result.pose, result.reference), lens)
-            posed = pose_hand(hand, result.pose, result.reference)
-            marks.append((offset_axes(hand, posed), posed.joints, as_seen(frame.truth.joints, lens)))
+            if not source.synthetic:
+                posed = pose_hand(hand, result.pose, result.reference)
+                marks.append((offset_axes(hand, posed), posed.joints, as_seen(frame.truth.joints, lens)))
             errors = np.linalg.norm(joints - frame.truth.joints, axis=1)
         rows["error_mm"].append(None if errors is None else _mm(errors))
         rows["largest_mm"].append(None if errors is None else round(1e3 * float(np.nanmax(errors)), 3))
     exact = session.hand.length if isinstance(session, SyntheticSession) else None
     ended = {"end_size_ratio": None if exact is None else hand.length / exact}
-    return rows | ended | {"own_offsets_mm": _nearest(marks, lens) if exact is None and marks else None}
+    return rows | ended | {"own_offsets_mm": _nearest(marks, lens) if marks else None}
 
 
 def _nearest(marks: list[tuple[Array, Array, Array]], lens: float) -> list[float]:

@@ -81,11 +81,12 @@ def measures_of(run: Run, session: Session, compared: Compared) -> dict[str, Any
     if session.has_truth:
         raw = measure_joints(joint_errors(track.joints, compared.truth))
         corrected = measure_joints(compared.errors)
+        nearest = measure_joints(joint_errors(compared.nearest, compared.truth))
         report |= _joints_part(raw, corrected)
-        report["mean_joint_error_own_offsets_mm"] = (
-            measure_joints(joint_errors(compared.nearest, compared.truth)).mean * 1e3
-        )
-        report |= {"correction": _correction_note(session, offsets)}
+        report |= {
+            "mean_joint_error_own_offsets_mm": nearest.mean * 1e3,
+            "correction": _correction_note(session, offsets),
+        }
         report |= _marks_part(session, compared)
     return _plain(report | _depth_part(compared) | _losses_part(track) | _work_part(track))
 

@@ -132,6 +132,11 @@ class Hand(NamedTuple):
         return len(self.dof_names)
 
     @property
+    def free_dip(self) -> bool:
+        """Whether the distal joints of the fingers are free, instead of following the middle ones."""
+        return self.dofs > len(DOF_NAMES)
+
+    @property
     def length(self) -> float:
         """Length of the hand from wrist to the middle finger's tip joint in the bind pose, m."""
         bind = self.skeleton.bind[self.joint_bone[_MIDDLE_TIP]]
@@ -262,7 +267,7 @@ def mirrored(hand: Hand) -> Hand:
         bind,
         hand.joint_bone,
         hand.joint_offset * MIRROR,
-        free_dip=hand.dofs == len(DOF_NAMES) + len(FREE_DIP_NAMES),
+        free_dip=hand.free_dip,
     )
 
 

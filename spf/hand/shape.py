@@ -132,7 +132,7 @@ def shaped(hand: Hand, shape: HandShape) -> Hand:
         np.concatenate([bind[:, :, :3], shape.scale * bind[:, :, 3:]], axis=2),
         hand.joint_bone,
         offsets * shape.scale,
-        free_dip=hand.dofs > 26,
+        free_dip=hand.free_dip,
     )
 
 
